@@ -34,8 +34,7 @@ from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
-from xosc_lateral.drivers.evaluation.record import scores_to_dict
-from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
 from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs, measured, with_fast_movement

@@ -53,7 +53,7 @@ def test_rows_in_a_file_give_the_same_bytes(scenario: Path, monkeypatch: pytest.
 def test_pages_of_the_file_leave_memory_by_themselves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rows, "IN_MEMORY", 0.0)
     before = rows.status_bytes(2)
-    with rows.beside(tmp_path):
+    with rows.spilling_to(tmp_path):
         column = rows.empty(20_000_000)
         column[:] = np.arange(20_000_000)
     deadline = time.monotonic() + 20.0

@@ -7,7 +7,7 @@ import numpy as np
 from laboratory.refined import rounded_profile
 from laboratory.rounding import rounded_effect
 from xosc_lateral.drivers.model.effects import Acts, Levels, Product, Saturating
-from xosc_lateral.drivers.model.effects.product import Factor
+from xosc_lateral.drivers.model.effects.shapes import Factor
 from xosc_lateral.files.profiles import read_profile
 
 

@@ -99,7 +99,7 @@ def test_an_allowed_folder_that_is_not_there_stops_a_batch_at_once(
 ) -> None:
     words = ["convert", str(scenario.parent), "-o", str(scenario.parent / "out"), "--allow", "nowhere"]
     assert main(words) == 1
-    assert capsys.readouterr().err == "xosc-lateral: nowhere: no such folder to allow\n"
+    assert capsys.readouterr().err == "xosc-lateral: --allow: nowhere: no such folder to allow\n"
     assert not (scenario.parent / "out").exists()
 
 

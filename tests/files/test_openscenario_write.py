@@ -34,7 +34,7 @@ from xosc_lateral.files.openscenario.provenance import provenance_of
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
 from xosc_lateral.world.motion.trajectory import WorldTrajectory

@@ -15,7 +15,7 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write import build, older, versions
 from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import separable
-from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
+from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,9 @@ class SimulationError(XoscLateralError, ValueError):
 
 
 class DriverProfileError(XoscLateralError, ValueError):
-    """A driver profile contradicts itself, or a profile of that name is unknown."""
+    """A driver profile contradicts itself, or a profile of the name `unknown` is nowhere."""
+
+    unknown: str | None = None
 
 
 class NotEnoughDataError(XoscLateralError, ValueError):

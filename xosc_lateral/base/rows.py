@@ -106,7 +106,7 @@ _store: ContextVar[_Store | None] = ContextVar("store", default=None)
 
 
 @contextmanager
-def beside(folder: Path | None) -> Iterator[None]:
+def spilling_to(folder: Path | None) -> Iterator[None]:
     """Columns beyond `IN_MEMORY` lie in a file in this folder, or above it where it is not there yet; None: in memory.
 
     They may be used after it. Raises `OSError` (with the folder) where its disk is full.

@@ -77,9 +77,17 @@ def group_of_verbs() -> typer.Typer:
 
 @cache
 def verb(name: str) -> Any:
-    """The command of a verb, its module loaded."""
-    module = import_module(f"xosc_lateral.cli.{MODULES.get(name, name.replace('-', '_'))}")
-    return cast(TyperGroup, typer.main.get_command(module.app)).commands[name]
+    """The command of a verb, its module loaded, and with the options of its call."""
+    from xosc_lateral.cli.words import with_options
+
+    app = import_module(f"xosc_lateral.cli.{MODULES.get(name, name.replace('-', '_'))}").app
+    chosen = group_of_verbs()
+    chosen.registered_commands = [info for info in app.registered_commands if info.name == name]
+    chosen.registered_groups = [info for info in app.registered_groups if info.name == name]
+    for group in (chosen, *(cast(typer.Typer, info.typer_instance) for info in chosen.registered_groups)):
+        for info in group.registered_commands:
+            info.callback = info.callback and with_options(info.callback)
+    return cast(TyperGroup, typer.main.get_command(chosen)).commands[name]
 
 
 class _Verbs(TyperGroup):
@@ -101,10 +109,11 @@ app.callback()(_root)
 
 
 def _in_words(error: XoscLateralError | OSError) -> str:
-    """What went wrong; the system's errors in the form of ours, file first and without their number."""
+    """What went wrong, after the option at fault; the system's errors in the form of ours, file first, no number."""
+    text = str(error)
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
-    return str(error)
+        text = f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+    return ": ".join([*getattr(error, "__notes__", ()), text])
 
 
 def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:

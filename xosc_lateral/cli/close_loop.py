@@ -11,9 +11,10 @@ from typing import Annotated
 
 import typer
 
+import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Library, Mapped, Seed, Tables, Written, command, pairs
+from xosc_lateral.cli.words import Options, Tables, Written, command
 
 # What is said of one option stays together.
 # fmt: off
@@ -61,17 +62,10 @@ def close_loop(
     tables: Tables, *,
     output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")],
     report: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")],
-    profile: Annotated[str | None, typer.Option("--profile", "-p", metavar="NAME|PATH",
-        help="Profile to start from; default: one is fitted.")] = None,
-    seed: Seed = 0,
-    leave_out: Annotated[list[str] | None, typer.Option(metavar="COLUMN",
-        help="Context column to ignore; may be repeated.")] = None,
-    role: Annotated[list[str] | None, typer.Option(metavar="COLUMN=ROLE",
-        help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.")] = None,
-    mapped: Mapped, library: Library = None, reply: Written,
+    options: Annotated[Options, xl.close_loop],
+    reply: Written,
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
-    from xosc_lateral import close_loop, write_profile
     from xosc_lateral.files.output_paths import claim, output_file, output_folder
     from xosc_lateral.workflows.profiles.loop import ClosedLoop
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
@@ -79,10 +73,7 @@ def close_loop(
     written = output_file(output, "refined.json", PROFILE_SUFFIXES)
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=reply.force)
     with shown_progress("closing the loop", reply.quiet) as progress:
-        result = close_loop(
-            tables, profile, seed=seed, name=written.stem, leave_out=leave_out or (), roles=pairs(role, "--role"),
-            columns=mapped.mapping(), library=library or (), progress=progress,
-        )
-    write_profile(result.profile, written, force=reply.force)
+        result = xl.close_loop(tables, name=written.stem, progress=progress, **options)
+    xl.write_profile(result.profile, written, force=reply.force)
     result.write_report(report, force=reply.force)
     reply.say(result)

@@ -9,21 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
+import xosc_lateral as xl
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import (
-    Allow,
-    Library,
-    Osi,
-    Printing,
-    RoadPath,
-    Written,
-    command,
-    say_json,
-    warn,
-    write_stdout,
-)
+from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
@@ -35,6 +25,15 @@ if TYPE_CHECKING:
 app = group_of_verbs()
 
 BATCH = "Batches"
+
+
+def _some_processes(jobs: int) -> int:
+    if jobs == 0 or jobs < -1:
+        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
+    return jobs
+
+
+Jobs = Annotated[int, typer.Option(help="Number of processes; -1: one per core.", callback=_some_processes)]
 
 
 class _WithPanels(TyperCommand):
@@ -66,12 +65,13 @@ def convert(
     *,
     output: Annotated[str | None, typer.Option("-o", "--output",
         help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder.")] = None,
-    settings: Annotated[dict[str, Any], ConvertSettings],
+    settings: Annotated[Options, ConvertSettings],
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html",
         help="Page that shows what was added; for a batch, a folder of pages.")] = None,
     osi: Osi = None,
-    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", rich_help_panel=BATCH)] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", callback=_some_processes,
+        rich_help_panel=BATCH)] = 1,
     job_timeout: Annotated[float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400,
         rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
     job_memory: Annotated[float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6,
@@ -94,8 +94,6 @@ def convert(
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
-    if jobs == 0 or jobs < -1:
-        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
     if report is not None and Path(report).is_file():
         raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
     options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
@@ -127,7 +125,7 @@ def _convert_one(
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.workflows.conversion.conversion import osi_files
-    from xosc_lateral.workflows.conversion.convert import convert, lifelike, numbered, output_scenario
+    from xosc_lateral.workflows.conversion.convert import convert, default_output, numbered, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     if output == STDOUT:
@@ -139,7 +137,7 @@ def _convert_one(
         _warn_if_cut_off(result, reply.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
-        written = lifelike(source) if output is None else output_scenario(output, source)
+        written = default_output(source) if output is None else output_scenario(output, source)
         page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         trace = None if osi is None else osi_files(osi, source)[0]
         files = [
@@ -192,18 +190,10 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 def verify(
     outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
         help="Converted scenarios, or folders with a manifest.", show_default=False)],
-    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
-    fast: Annotated[bool, typer.Option("--fast", help="Compare hashes alone; make nothing again.")] = False,
-    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.")] = 1,
-    reply: Printing,
+    *, options: Annotated[Options, xl.verify], jobs: Jobs = 1, reply: Printing,
 ) -> None:
     """Make outputs again in memory and name those that differ, and why: edited, other inputs, another version."""
-    from xosc_lateral import verify as check
-
-    if jobs == 0 or jobs < -1:
-        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
-    places = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
-    result = check(outputs, **places, fast=fast, workers=0 if jobs == 1 else jobs)
+    result = xl.verify(outputs, **options, workers=0 if jobs == 1 else jobs)
     reply.say(result, even=bool(result.failing))
     if result.failing:
         raise typer.Exit(1)
@@ -217,17 +207,13 @@ def reproduce(
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
         show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
-    *, library: Library = None, allow: Allow = None, road_path: RoadPath = None,
-    jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.")] = 1,
+    *, options: Annotated[Options, xl.reproduce],
+    jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.",
+        callback=_some_processes)] = 1,
     reply: Written,
 ) -> None:
     """Make an output, or a folder of them, again and compare the content; exit code 1 if it differs."""
-    from xosc_lateral import reproduce as again
-
-    if jobs == 0 or jobs < -1:
-        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
-    places = {"library": library or (), "allow": allow or (), "road_path": road_path or ()}
-    result = again(output, new, **places, workers=jobs, force=reply.force)
+    result = xl.reproduce(output, new, **options, workers=jobs, force=reply.force)
     reply.say(result, even=bool(result.failing))
     if result.failing:
         raise typer.Exit(1)

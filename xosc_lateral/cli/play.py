@@ -8,17 +8,14 @@ from typing import Annotated
 
 import typer
 
+import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import (
-    Allow,
     Force,
+    Options,
     Osi,
-    Parameters,
     Printing,
     Quiet,
-    Road,
-    RoadPath,
-    TimeLimit,
     Verbose,
     Written,
     command,
@@ -45,15 +42,10 @@ def play(
     output: Annotated[str | None, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .",
         show_default=False)] = None,
     osi: Osi = None,
-    step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
-    time_limit: TimeLimit = None, parameter: Parameters = None, allow: Allow = None, road: Road = None,
-    road_path: RoadPath = None,
-    strict: Annotated[bool, typer.Option("--strict",
-        help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
+    options: Annotated[Options, xl.play],
     reply: Written,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
-    from xosc_lateral import play
     from xosc_lateral.files.osi import SUFFIXES, osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.files.output_tables import output_suffixes
@@ -65,10 +57,7 @@ def play(
     trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
     claim([table, trace], [scenario], force=reply.force)
     osi_wanted(trace)
-    played = play(
-        scenario, step=step, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or (), road=road,
-        road_path=road_path or (), strict=strict,
-    )
+    played = xl.play(scenario, **options)
     written = None
     if output == STDOUT:
         write_stdout(played.csv())
@@ -83,20 +72,17 @@ def play(
         for note in played.notes:
             typer.echo(note, err=True)
     warn(played.warnings)
-    if strict and played.warnings:
+    if options["strict"] and played.warnings:
         raise typer.Exit(1)
 
 
 @command(app, "segments", VERBS["segments"], "segments cut-in.xosc", "segments cut-in.xosc --json")
 def segments(
-    scenario: Scenario, *, time_limit: TimeLimit = None, parameter: Parameters = None, allow: Allow = None,
-    reply: Printing,
+    scenario: Scenario, *, options: Annotated[Options, xl.segments], reply: Printing,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
-    from xosc_lateral import play, segments
-
-    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
-    listed = segments(played)
+    played = xl.play(scenario, **options)
+    listed = xl.segments(played)
     warn(played.warnings)
     reply.say(listed)
 
@@ -106,18 +92,16 @@ def segments(
     "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/",
 )
 def view(
-    scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
+    scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)], *,
     output: Annotated[str | None, typer.Option("--output", "-o",
         help="Page to write; default: NAME_view.html beside it.")] = None,
-    parameter: Parameters = None, allow: Allow = None, time_limit: TimeLimit = None,
+    options: Annotated[Options, xl.segments],
     open_page: Annotated[bool | None, typer.Option("--open/--no-open",
         help="Open the page in the browser. Default: from a terminal.")] = None,
     force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
-    from xosc_lateral import play
-
-    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    played = xl.play(scenario, **options)
     page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
     warn(played.warnings)
     if not quiet:
@@ -136,9 +120,7 @@ def list_(
     *, reply: Printing,
 ) -> None:
     """List the templates, or one template's settings with units, defaults and ranges."""
-    from xosc_lateral import list_templates
-
-    reply.say(list_templates(name))
+    reply.say(xl.list_templates(name))
 
 
 @command(group, "write", "Write a scenario and its road.", "template write cut-in -o out/ --set ego_speed=28")
@@ -151,8 +133,6 @@ def write(
     reply: Written,
 ) -> None:
     """Write a template's scenario and its road."""
-    from xosc_lateral import write_template
-
     chosen: dict[str, str] = pairs(settings, "--set")
-    written = write_template(name, output, force=reply.force, **chosen)
+    written = xl.write_template(name, output, force=reply.force, **chosen)
     reply.say_written(written, template=name, settings=chosen)

@@ -7,19 +7,14 @@ from typing import Annotated
 
 import typer
 
+import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Library, Printing, Seed, Written, command, pairs, say_json, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Written, command, say_json, write_stdout
+from xosc_lateral.workflows.profiles import keeping, profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
 Page = Annotated[str | None, typer.Option(metavar="PAGE.html", help="Also write a page with figures.")]
-Tags = Annotated[list[str] | None, typer.Option("--tag", metavar="TAG", help="Tag to add; may be repeated.")]
-Fields = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="FIELD=VALUE", help="Metadata: version, driver, vehicle, road, country, date or licence."
-    ),
-]
 
 # What is said of one option stays together.
 # fmt: off
@@ -30,49 +25,41 @@ app.add_typer(group, name="profiles", short_help=VERBS["profiles"])
 
 @command(group, "list", "List profiles.", "profiles list --tag truck --where country=DE")
 def list_(
-    *, library: Library = None,
-    tags: Annotated[list[str] | None, typer.Option("--tag", metavar="TAG",
-        help="Only profiles with this tag; may be repeated.")] = None,
-    where: Annotated[list[str] | None, typer.Option(metavar="FIELD=VALUE",
-        help="Only profiles with this value, e.g. country=DE; may be repeated.")] = None,
-    reply: Printing,
+    *, options: Annotated[Options, xl.list_profiles], reply: Printing,
 ) -> None:
     """List all profiles with model and source, and name files that cannot be read."""
-    from xosc_lateral import list_profiles
-
-    entries = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
-    reply.say(entries)
+    reply.say(xl.list_profiles(**options))
 
 
 @command(group, "show", "Show one profile's card.", "profiles show motorway --report card.html")
-def show(name: Name, *, library: Library = None, report: Page = None, reply: Written) -> None:
+def show(
+    profile: Name, *, options: Annotated[Options, xl.read_profile], report: Page = None, reply: Written,
+) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
-    from xosc_lateral import read_profile
     from xosc_lateral.workflows.conversion.proof import proofs_of
     from xosc_lateral.workflows.conversion.seen import NEIGHBOURS
     from xosc_lateral.workflows.profiles.cards import card, card_text
-    from xosc_lateral.workflows.profiles.profiles import write_card
 
-    profile = read_profile(name, library or ())
+    driver = xl.read_profile(profile, **options)
     if report is not None:
-        write_card(profile, report, force=reply.force)
+        profiles.write_card(driver, report, force=reply.force)
     if reply.as_json:
-        say_json(card(profile))
+        say_json(card(driver))
     elif not reply.quiet:
-        beside = [effect for effect in profile.effects if NEIGHBOURS.intersection(effect.columns)]
-        typer.echo("\n".join([card_text(profile), *(f"  converted  {one}" for one in proofs_of(profile, beside))]))
+        beside = [effect for effect in driver.effects if NEIGHBOURS.intersection(effect.columns)]
+        typer.echo("\n".join([card_text(driver), *(f"  converted  {one}" for one in proofs_of(driver, beside))]))
 
 
 @command(
     group, "compare", "Compare several profiles.", "profiles compare motorway motorway-vehicle-1 --report compared.html"
 )
-def compare(names: Names, *, library: Library = None, seed: Seed = 0, report: Page = None, reply: Written) -> None:
+def compare(
+    names: Names, *, options: Annotated[Options, xl.compare_profiles], report: Page = None, reply: Written,
+) -> None:
     """Compare profiles, and show which are not distinguishable."""
-    from xosc_lateral import compare_profiles
-
     if len(names) < 2:
         raise typer.BadParameter("at least two profiles are needed", param_hint="NAME|PATH...")
-    compared = compare_profiles(*names, seed=seed, library=library or ())
+    compared = xl.compare_profiles(*names, **options)
     if report is not None:
         compared.write_report(report, force=reply.force)
     reply.say(compared)
@@ -87,8 +74,6 @@ def derive(
     *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
-    preset: Annotated[str | None,
-        typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")] = None,
     sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
     mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
     restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
@@ -98,26 +83,25 @@ def derive(
     speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
     vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
         help="What the base knows of trucks.")] = None,
-    called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
-    library: Library = None, reply: Written,
+    options: Annotated[Options, profiles.derive_profile],
+    reply: Written,
 ) -> None:
     """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
 
     The base gives what is not stated. Of a population the typical driver is taken.
     """
-    from xosc_lateral import write_profile
     from xosc_lateral.files.output_paths import STDOUT, output_file
     from xosc_lateral.files.profiles import profile_bytes
-    from xosc_lateral.workflows.profiles.profiles import derive_profile
 
-    figures: dict[str, float | str | None] = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
+    figures: Options = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
     figures |= {"memory": memory, "near_line": near_line, "speed": speed, "vehicle": vehicle}
-    name = called or (output_file(output, "", (".json",)).stem if output.endswith(".json") else "")
-    made = derive_profile(base, name=name, preset=preset, library=library or (), **figures)
+    if not options["name"] and output.endswith(".json"):
+        options["name"] = output_file(output, "", (".json",)).stem
+    made = profiles.derive_profile(base, **options, **figures)
     if output == STDOUT:
         write_stdout(profile_bytes(made.profile))
         return
-    path = write_profile(made.profile, output, force=reply.force)
+    path = xl.write_profile(made.profile, output, force=reply.force)
     reply.say_words(str(made), {"output": str(path), **made.profile.provenance.fit}, err=False)
 
 
@@ -125,52 +109,39 @@ def derive(
     group, "add", "Add a profile to a library.", "profiles add mine.json --library team/ --tag truck --set country=DE"
 )
 def add(
-    name: Name, *,
-    library: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the library; created if missing.")],
-    called: Annotated[str | None, typer.Option("--name", help="Id in the library; default: its own.")] = None,
-    tags: Tags = None, fields: Fields = None, reply: Written,
+    profile: Name, *, options: Annotated[Options, profiles.add_profile], reply: Written,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
-    from xosc_lateral.workflows.profiles.profiles import add_profile
-
-    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=reply.force)
+    path = profiles.add_profile(profile, **options, force=reply.force)
     reply.say_written(path, id=path.stem)
 
 
 @command(group, "tag", "Change tags and metadata.", "profiles tag mine --library team/ --tag night --remove day")
 def tag(
-    name: Name, *, library: Library = None, tags: Tags = None,
-    remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
-    fields: Fields = None, reply: Printing,
+    name: Name, *, options: Annotated[Options, profiles.tag_profile], reply: Printing,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.files.profiles import facts_of
-    from xosc_lateral.workflows.profiles.profiles import tag_profile
 
-    metadata = pairs(fields, "--set")
-    changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)
+    changed = profiles.tag_profile(name, **options)
     facts = {**facts_of(changed), "tags": list(changed.metadata.tags)}
     reply.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
 
 
 @command(group, "remove", "Delete profiles from a library.", "profiles remove mine --library team/")
-def remove(names: Names, *, library: Library = None, reply: Printing) -> None:
+def remove(names: Names, *, options: Annotated[Options, keeping.remove_profiles], reply: Printing) -> None:
     """Delete the files of profiles of your own, all or none; `profiles uses` says which outputs used them."""
-    from xosc_lateral.workflows.profiles.keeping import remove_profiles
-
-    reply.say_written(remove_profiles(names, library or ()))
+    reply.say_written(keeping.remove_profiles(names, **options))
 
 
 @command(group, "rename", "Give a profile another id.", "profiles rename mine night-driver --library team/")
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
-    *, library: Library = None, reply: Written,
+    *, options: Annotated[Options, keeping.rename_profile], reply: Written,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
-    from xosc_lateral.workflows.profiles.keeping import rename_profile
-
-    path = rename_profile(name, new, library or (), force=reply.force)
+    path = keeping.rename_profile(name, new, **options, force=reply.force)
     reply.say_written(path, id=path.stem)
 
 
@@ -178,12 +149,10 @@ def rename(
 def uses(
     name: Annotated[str, typer.Argument(metavar="ID", help="Profile, in the library or no longer.")],
     outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
-    *, library: Library = None, reply: Printing,
+    *, options: Annotated[Options, keeping.find_uses], reply: Printing,
 ) -> None:
     """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
-    from xosc_lateral.workflows.profiles.keeping import find_uses
-
-    reply.say(find_uses(name, outputs, library or ()))
+    reply.say(keeping.find_uses(name, outputs, **options))
 
 
 @command(
@@ -193,29 +162,26 @@ def export(
     names: Names, *,
     output: Annotated[str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.",
         show_default=False)],
-    library: Library = None, reply: Written,
+    options: Annotated[Options, xl.read_profile], reply: Written,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
-    from xosc_lateral import read_profile, write_profile
     from xosc_lateral.files.output_paths import STDOUT, is_folder
     from xosc_lateral.files.profiles import profile_bytes
 
-    chosen = [read_profile(name, library or ()) for name in names]
+    chosen = [xl.read_profile(name, **options) for name in names]
     if len(chosen) > 1 and not is_folder(output):
         raise typer.BadParameter("several profiles go to a folder: -o FOLDER/", param_hint="-o")
     if output == STDOUT:
         write_stdout(profile_bytes(chosen[0]))
         return
-    written = [write_profile(profile, output, force=reply.force) for profile in chosen]
+    written = [xl.write_profile(profile, output, force=reply.force) for profile in chosen]
     reply.say_written(written)
 
 
 @command(group, "check", "Check a library for broken files.", "profiles check --library team/")
-def check(*, library: Library = None, reply: Printing) -> None:
+def check(*, options: Annotated[Options, xl.read_profile], reply: Printing) -> None:
     """Read every profile of the library; exit with 1 if one cannot be read or its id is not its file's name."""
-    from xosc_lateral import list_profiles
-
-    entries = list_profiles(library or ())
+    entries = xl.list_profiles(**options)
     wrong = [entry.problem for entry in entries if entry.problem]
     if reply.as_json:
         problems = [{"path": str(entry.path), "problem": entry.problem} for entry in entries if entry.problem]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Written, command
+from xosc_lateral.cli.words import Mapped, Options, Written, command
 from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 
 # What is said of one option stays together.
@@ -26,16 +27,9 @@ def reconstruct(
     recording: Annotated[Path, typer.Argument(help="Tracks of several vehicles.", show_default=False)],
     *,
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
-    format_: Annotated[str | None, typer.Option("--format",
-        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.", show_default=False)] = None,
-    road: Annotated[Path | None, typer.Option("--road",
-        help="OpenDRIVE file, or SUMO network, that it was recorded on.", show_default=False)] = None,
     mapped: Mapped,
-    settings: Annotated[dict[str, Any], ReconstructSettings],
+    settings: Annotated[Options, ReconstructSettings],
     reply: Written,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
-    from xosc_lateral import reconstruct as make
-
-    columns = mapped.mapping()
-    reply.say(make(recording, output, format=format_, road=road, columns=columns, force=reply.force, **settings))
+    reply.say(xl.reconstruct(recording, output, columns=mapped.mapping(), **settings, force=reply.force))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, is_dataclass
-from enum import StrEnum
+from dataclasses import dataclass, is_dataclass, replace
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -20,7 +18,7 @@ from xosc_lateral.base.errors import XoscLateralError
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
-    from xosc_lateral.workflows.conversion.options import Option
+    from xosc_lateral.workflows.options import Option
     from xosc_lateral.workflows.result import Result
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
@@ -61,65 +59,20 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")
 Osi = Annotated[str | None, typer.Option("--osi", metavar="TRACE",
     help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
-Seed = Annotated[int, typer.Option(help="Random seed; the same inputs and seed give the same bytes.", min=0)]
-Library = Annotated[list[Path] | None, typer.Option(metavar="FOLDER",
-    help="Folder with more profiles; may be repeated.")]
-Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
 Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
 Columns = Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
     help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.")]
 MappingFile = Annotated[Path | None, typer.Option("--mapping", metavar="FILE.toml",
     help="Saved mapping of columns (import table --propose FILE...).")]
-Parameters = Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE",
-    help="Set a scenario parameter; may be repeated.")]
-Allow = Annotated[list[Path] | None,
-    typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")]
-Road = Annotated[Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.",
-    show_default=False)]
-RoadPath = Annotated[list[Path] | None, typer.Option("--road-path", metavar="DIR",
-    help='Folder with roads known by name ("Town04"); may be repeated.')]
-
-
-def _number(value: float | None) -> float | None:
-    """NaN is within every range that is tested by comparing."""
-    if value is not None and math.isnan(value):
-        raise typer.BadParameter(f"{value} is not a number")
-    return value
-
-
-TimeLimit = Annotated[float | None,
-    typer.Option(help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.", callback=_number,
-    min=0.1, max=86_400, show_default=False)]
-
-
-class Part(StrEnum):
-    """Parts of a profile that are left out unless asked for."""
-
-    SENSOR = "sensor"
-
-
-With = Annotated[list[Part] | None, typer.Option("--with",
-    help="sensor: add the error of the sensor that measured the drives.")]
-
 # fmt: on
 
-
-SHARED = {
-    "seed": Seed,
-    "parameters": Parameters,
-    "library": Library,
-    "allow": Allow,
-    "road": Road,
-    "road_path": RoadPath,
-    "time_limit": TimeLimit,
-    "with_sensor": With,
-}
-"""Options of `convert` that other verbs have as well."""
+Options = dict[str, Any]
+"""What was said of a call's options, by its keywords."""
 
 
 def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     """Read ``NAME=VALUE`` words; wrong usage when there is no ``=`` or a name comes twice."""
-    from xosc_lateral.workflows.conversion.options import texts
+    from xosc_lateral.workflows.options import texts
 
     with naming_option(option):
         return texts(list(words or ()))
@@ -212,72 +165,118 @@ def flags_of(name: str, option: Option) -> tuple[str, ...]:
     return option.flags or (f"--{name.replace('_', '-')}",)
 
 
-def _parameters(settings: type) -> list[Parameter]:
-    """An option for each setting, or for each field of a group such as `Printing`, `force` first."""
-    from xosc_lateral.workflows.conversion.options import settable
-
-    items = settable(settings)
-    if not items:
-        kinds = get_type_hints(settings, include_extras=True)  # of each base in its own module
-        group = [each.replace(annotation=kinds[name]) for name, each in signature(settings).parameters.items()]
-        return sorted(group, key=lambda parameter: parameter.name != "force")
-    parameters = []
-    for item in items:
-        option: Option = item.metadata["option"]
-        kind = (
-            SHARED.get(item.name) or Annotated[option.kind, typer.Option(*flags_of(item.name, option), **option.words)]
-        )
-        default = None if type(None) in get_args(get_args(kind)[0]) else item.default
-        parameters.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
-    return parameters
+def _fields(group: type) -> list[Parameter]:
+    """Options of a group such as `Printing`, `force` first."""
+    kinds = get_type_hints(group, include_extras=True)  # of each base in its own module
+    parameters = [each.replace(annotation=kinds[name]) for name, each in signature(group).parameters.items()]
+    return sorted(parameters, key=lambda parameter: parameter.name != "force")
 
 
-def _read(settings: type, /, **words: Any) -> Any:
-    """A group; or what was said of settings, wrong usage if it can't be."""
-    from xosc_lateral.workflows.conversion.options import options_of
+def _options_of(source: Any) -> dict[str, Option]:
+    """What can be set of a call or of settings, where they have only its name with what all verbs say of it."""
+    from xosc_lateral.workflows.options import SHARED, options_of
 
-    options = options_of(settings)
-    if not options:
-        return settings(**words)
-    values = {name: value for name, value in words.items() if value not in (None, [])}
-    for name, value in values.items():
-        with naming_option(flags_of(name, options[name])[0]):
-            options[name].read(value)
+    return {
+        name: replace(SHARED[name], read=option.read) if option.kind is None and name in SHARED else option
+        for name, option in options_of(source).items()
+    }
+
+
+def _parameters(source: Any, options: Mapping[str, Option]) -> Iterator[Parameter]:
+    """The command line's options for them."""
+    defaults = signature(source).parameters
+    for name, option in options.items():
+        if name == "columns":
+            yield from _fields(Mapped)
+            continue
+        default = None if type(None) in get_args(option.kind) else defaults[name].default
+        words = typer.Option(*flags_of(name, option), **option.words)
+        yield Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[option.kind, words])
+
+
+def _read(options: Mapping[str, Option], words: dict[str, Any]) -> Options:
+    """What was said of them; wrong usage if it can't be."""
+    values = Options()
+    for name, option in options.items():
+        if name == "columns":
+            values[name] = Mapped(words.pop("columns"), words.pop("mapping_file")).mapping()
+        elif (stated := words.pop(name)) not in (None, []):
+            with naming_option(flags_of(name, option)[0]):
+                values[name] = option.read(stated)
     return values
+
+
+@contextmanager
+def _naming_missing(stated: Mapping[str, Any]) -> Iterator[None]:
+    """A file, folder or profile that is not there is named with the option that asked for it."""
+    try:
+        yield
+    except (XoscLateralError, OSError) as error:
+        missing = getattr(error, "unknown", None)
+        path = error.filename if isinstance(error, OSError) else getattr(error, "path", None)
+        if path is not None and not Path(path).exists():
+            missing = str(path)
+        for option, value in stated.items():
+            texts = [str(text).rpartition("=")[2] for text in (value if isinstance(value, list) else [value])]
+            if missing is not None and str(missing) in texts:
+                error.add_note(option)
+                break
+        raise
 
 
 def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
     """The verb with options of its own for those that it has together in one parameter.
 
-    Such a parameter is a dataclass as `Printing`, or a mapping that is annotated with a class of settings.
+    Such a parameter is a dataclass as `Printing`, or a mapping that is annotated with a class of settings or a call.
+    What all verbs say alike (`SHARED`) needs its name only.
     """
-    options, groups = list[Parameter](), dict[str, tuple[type, list[str]]]()
-    for parameter in signature(verb, eval_str=True).parameters.values():
+    from xosc_lateral.workflows.options import SHARED
+
+    declared = signature(verb, eval_str=True).parameters
+    plain = {name for name, parameter in declared.items() if not hasattr(parameter.annotation, "__metadata__")}
+    shared = {name: option for name, option in SHARED.items() if name in plain}
+    parameters: list[Parameter] = []
+    groups: dict[str, list[str]] = {}
+    sources: dict[str, dict[str, Option]] = {}
+    for name, parameter in declared.items():
         kinds = [parameter.annotation, *getattr(parameter.annotation, "__metadata__", ())]
-        settings = next((kind for kind in kinds if isinstance(kind, type) and is_dataclass(kind)), None)
-        added = [parameter] if settings is None else _parameters(settings)
-        if settings is not None:
-            groups[parameter.name] = settings, [option.name for option in added]
-        options += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in added]
+        source = next((kind for kind in kinds if is_dataclass(kind) or hasattr(kind, "__options__")), None)
+        if name in shared:
+            added = list(_parameters(verb, {name: shared[name]}))
+        elif source is None:
+            added = [parameter]
+        elif source is parameter.annotation:
+            added = _fields(source)
+            groups[name] = [option.name for option in added]
+        else:
+            sources[name] = {key: option for key, option in _options_of(source).items() if key not in declared}
+            added = list(_parameters(source, sources[name]))
+        parameters += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in added]
 
     @wraps(verb)
     def run(**values: Any) -> None:
-        for name, (settings, names) in groups.items():
-            values[name] = _read(settings, **{option: values.pop(option) for option in names})
-        verb(**values)
+        known = {name: option for options in (shared, *sources.values()) for name, option in options.items()}
+        stated = {flags_of(name, option)[0]: values.get(name) for name, option in known.items()}
+        for name, names in groups.items():
+            values[name] = declared[name].annotation(**{option: values.pop(option) for option in names})
+        for name, options in sources.items():
+            values[name] = _read(options, values)
+        values |= _read(shared, values)
+        with _naming_missing(stated):
+            verb(**values)
 
-    run.__signature__ = Signature(options)  # type: ignore[attr-defined]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     return run
 
 
 def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any = None) -> Callable[[Verb], Verb]:
-    """Add a verb to a group, with examples and its page at the end of its help."""
+    """Add a verb to a group, with examples and its page at the end of its help; `cli.verb` gives it its options."""
 
     def add(verb: Verb) -> Verb:
         page = PAGES[verb.__module__.rpartition(".")[2]]
         lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
         epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
-        group.command(name, cls=cls, short_help=short, epilog=epilog)(with_options(verb))
+        group.command(name, cls=cls, short_help=short, epilog=epilog)(verb)
         return verb
 
     return add

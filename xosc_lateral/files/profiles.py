@@ -54,10 +54,12 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     if (offered := _from_plugins().get(text)) is not None:
         return offered
     known = sorted({path.stem for path in list_profiles(folders)})
-    raise DriverProfileError(
+    error = DriverProfileError(
         f"no profile {text!r}{did_you_mean(text, known)}; known are {', '.join(known) or 'none'}, "
         "or give the path of a file"
     )
+    error.unknown = text
+    raise error
 
 
 def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:

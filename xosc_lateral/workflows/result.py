@@ -10,18 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import numpy as np
-
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.conversion.options import PathLike, Paths, ProfileLike
-from xosc_lateral.workflows.conversion.options import paths as as_paths
+from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
+from xosc_lateral.workflows.options import paths as as_paths
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from xosc_lateral.drivers.drives.drive import Drive
+    from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
 
 
@@ -128,10 +126,12 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     FormatError, NotEnoughDataError
         See `files.drives.read_drives`.
     """
+    from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
     from xosc_lateral.files.mapping import as_mapping
 
-    items = _listed(drives)
+    several = isinstance(drives, Sequence) and not isinstance(drives, str | Path | Drive)
+    items: list[Any] = list(drives) if several else [drives]  # type: ignore[arg-type]
     mapping = as_mapping(columns)
     files = [Path(item) for item in items if isinstance(item, str | Path)]
     if len(files) == len(items):
@@ -152,6 +152,8 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
 
 def frame_hash(frame: pd.DataFrame) -> str:
     """SHA-256 over the names, kinds and values of a frame's columns, in hexadecimal."""
+    import numpy as np
+
     digest = hashlib.sha256()
     for name in frame.columns:
         values = frame[name]
@@ -167,10 +169,4 @@ def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:
     """A profile as it is, or read by its path or name; see `read_profile`."""
     from xosc_lateral.files.profiles import read_profile
 
-    return profile if isinstance(profile, DriverProfile) else read_profile(profile, as_paths(library))
-
-
-def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
-    if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
-        return [drives]
-    return list(drives)
+    return read_profile(profile, as_paths(library)) if isinstance(profile, str | Path) else profile

@@ -23,8 +23,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     split_groups,
     wasserstein,
 )
-from xosc_lateral.drivers.evaluation.record import scores_to_dict
-from xosc_lateral.drivers.evaluation.scores import score_profile, score_snippets
+from xosc_lateral.drivers.evaluation.scores import score_profile, score_snippets, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import snippets_of
 from xosc_lateral.drivers.evaluation.spectra import autocorrelation, spectrum
 from xosc_lateral.drivers.fitting.fitting import fit_runs

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import periodogram
 from scipy.stats import entropy, kurtosis
 
-from xosc_lateral.drivers.evaluation.shape import EXTREME_QUANTILE, LARGE_CHANGE, SHAPES, shape_features
+from xosc_lateral.drivers.evaluation.classifier import EXTREME_QUANTILE, LARGE_CHANGE, SHAPES, shape_features
 
 RNG = np.random.default_rng(41)
 TIME = 0.2 * np.arange(51)

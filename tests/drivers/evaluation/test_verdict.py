@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.spectra import comparison_band, dithered, slow_movement
-from xosc_lateral.drivers.evaluation.verdict import Verdict, alarms_per_hour, verdict_of
+from xosc_lateral.drivers.evaluation.spectra import (
+    Verdict,
+    alarms_per_hour,
+    comparison_band,
+    dithered,
+    slow_movement,
+    verdict_of,
+)
 
 STEP = 0.2
 

@@ -14,8 +14,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.evaluation.lane_keeping import highway_drives
 from xosc_lateral.drivers.fitting import derive as deriving
-from xosc_lateral.drivers.fitting.derive import derive
-from xosc_lateral.drivers.fitting.stated_figures import PRESETS, Asked
+from xosc_lateral.drivers.fitting.derive import PRESETS, Asked, derive
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 

@@ -11,7 +11,7 @@ from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.model.effects import Acts, Product
-from xosc_lateral.drivers.model.effects.product import Factor, Form
+from xosc_lateral.drivers.model.effects.shapes import Factor, Form
 
 PRODUCT = MeanTerm.of(
     Product(

@@ -15,8 +15,8 @@ from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Linear, Product, Proximity, Saturating, Threshold
-from xosc_lateral.drivers.model.effects.product import Factor
 from xosc_lateral.drivers.model.effects.response import respond
+from xosc_lateral.drivers.model.effects.shapes import Factor
 from xosc_lateral.files.drives import drives_of_table
 
 LAG, RESPONSE, SIZE = -0.6, 1.7, 0.25

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.model.drivability import ACCELERATION_LIMIT, JERK_LIMIT, comfort, drivable, strain
+from xosc_lateral.drivers.model.plausibility import ACCELERATION_LIMIT, JERK_LIMIT, comfort, drivable, strain
 
 STEP = 0.2
 

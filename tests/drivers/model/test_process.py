@@ -10,9 +10,9 @@ from msgspec.structs import replace
 
 from tests.kit.certified import FOLDER, MODELS, SEED
 from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, EffectTerms, Linear, Population, Regimes
-from xosc_lateral.drivers.model.process import DriveProcess, combine
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain
+from xosc_lateral.drivers.model.sampling import DriveProcess, combine
 from xosc_lateral.files.profiles import read_profile
 
 HIDDEN = (

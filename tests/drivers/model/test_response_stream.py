@@ -10,9 +10,9 @@ import pytest
 from tests.kit.effects import STEP, made
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import ColumnEffect, Linear, Product
-from xosc_lateral.drivers.model.effects.product import Factor
-from xosc_lateral.drivers.model.process import ResponseStream, ResponseStreamState
+from xosc_lateral.drivers.model.effects.shapes import Factor
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.drivers.model.sampling import ResponseStream, ResponseStreamState
 
 N = 120
 

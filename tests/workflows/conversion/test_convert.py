@@ -61,7 +61,7 @@ def test_same_inputs_and_seed_give_the_same_bytes_and_another_seed_does_not(tmp_
     first = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).sha256
     again = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).sha256
     other = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=2)).sha256
-    variant = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1), variant=1)
+    variant = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1), variant_index=1)
     assert first == again
     assert len({first, other, variant.sha256}) == 3
     assert variant.sha256 == hashlib.sha256((tmp_path / "out.xosc").read_bytes()).hexdigest()

@@ -73,7 +73,7 @@ def test_whoever_follows_a_trajectory_moves_in_a_lane_change_as_if_there_were_no
         activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
         activity[rows] |= int(Activity.LATERAL)
         motion = together(drive(network, entity(), duration=20.0, activity=activity))
-        result = enrich(motion, network, {"car": simulated_profile()}, seed=1, through=["car"])
+        result = enrich(motion, network, {"car": simulated_profile()}, seed=1, continuous=["car"])
         (item,) = result.entities
         deviations.append(item.deviation)
         following = [segment.span for segment in item.segments]
@@ -98,7 +98,7 @@ def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what
         activity[500] |= int(Activity.TELEPORTED)
     motion = replace(motion, activity=activity)
     found = [
-        enrich(together(motion), network, {"car": simulated_profile()}, seed=1, through=names).entities[0].deviation
+        enrich(together(motion), network, {"car": simulated_profile()}, seed=1, continuous=names).entities[0].deviation
         for names in ((), ("car",))
     ]
     if what == "slow":
@@ -141,7 +141,7 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
     both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, neighbours=PROFILE)
     np.testing.assert_array_equal(alone.entity("a").deviation, both.entity("a").deviation)
     assert not np.array_equal(both.entity("a").deviation, both.entity("b").deviation)
-    for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "entropy": {"a": [1]}}):
+    for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "seed_words": {"a": [1]}}):
         changed = enrich(together(a), network, {"a": profile}, **other)  # type: ignore[arg-type]
         assert not np.array_equal(alone.entity("a").deviation, changed.entity("a").deviation)
 

@@ -11,12 +11,11 @@ import pytest
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import verb
-from xosc_lateral.cli.words import SHARED
 from xosc_lateral.files.configuration import SETTINGS
 from xosc_lateral.files.openscenario.write.draft import Player
-from xosc_lateral.workflows.conversion.options import options_of
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertKeywords, ConvertSettings, OutputMode
+from xosc_lateral.workflows.options import SHARED, options_of
 from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
 
 
@@ -25,7 +24,7 @@ def test_python_the_command_line_and_the_configuration_have_the_same_options() -
     for call in (xl.convert, xl.convert_many):
         assert OPTIONS.keys() <= inspect.signature(call).parameters.keys()
     assert OPTIONS.keys() <= {option.name for option in verb("convert").params}
-    assert {name for name, option in OPTIONS.items() if option.kind is None} == SHARED.keys()
+    assert {name for name, option in OPTIONS.items() if option.kind is None} == SHARED.keys() - {"profile", "columns"}
     assert OPTIONS.keys() >= SETTINGS
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from xosc_lateral.world.motion.deviation import SampledDeviation, deviation_through
+from xosc_lateral.world.motion.trajectory import SampledDeviation, deviation_through
 
 
 def _segment(rng: np.random.Generator, start: float, n: int) -> SampledDeviation:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from xosc_lateral.world.motion.deviation import NaturalSpline
+from xosc_lateral.world.motion.trajectory import NaturalSpline
 
 numbers = st.floats(-5.0, 5.0)
 gaps = st.floats(0.05, 200.0)

@@ -23,7 +23,7 @@ from xosc_lateral.world.player.boxes import (
     overlap,
 )
 from xosc_lateral.world.player.simulation import TrafficSignals
-from xosc_lateral.world.player.values import Values, holds, holds_exactly
+from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.road.positions import Pose
 from xosc_lateral.world.scenario.entity import BoundingBox, Performance
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
@@ -135,7 +135,7 @@ def test_limits_are_the_tighter_of_action_and_vehicle() -> None:
 def test_rules_hold_as_they_say_and_hardly_apart_is_equal(rule: Rule, below: bool, same: bool, above: bool) -> None:
     assert [holds(value, rule, 10.0) for value in (9.0, 10.0, 11.0)] == [below, same, above]
     assert [holds(value, rule, 10.0) for value in (10.0 - 1e-9, 10.0 + 1e-9)] == [same, same]
-    assert [holds_exactly(value, rule, 10) for value in (9, 10, 11)] == [below, same, above]
+    assert [rule.holds(value, 10) for value in (9, 10, 11)] == [below, same, above]
     assert holds(inf, rule, inf) is same
 
 

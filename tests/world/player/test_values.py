@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.player.values import Values, holds, holds_exactly
+from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
 from xosc_lateral.world.scenario.place import Place
@@ -71,9 +71,9 @@ def test_infinity_equals_itself(rule: Rule) -> None:
 
 @given(st.integers(-50, 50), st.integers(-50, 50))
 def test_whole_numbers_compare_exactly(left: int, right: int) -> None:
-    assert holds_exactly(left, Rule.GREATER_THAN, right) == (left > right)
-    assert holds_exactly(left, Rule.LESS_OR_EQUAL, right) == (left <= right)
-    assert holds_exactly(left, Rule.NOT_EQUAL_TO, right) == (left != right)
+    assert Rule.GREATER_THAN.holds(left, right) == (left > right)
+    assert Rule.LESS_OR_EQUAL.holds(left, right) == (left <= right)
+    assert Rule.NOT_EQUAL_TO.holds(left, right) == (left != right)
 
 
 # ---- values of a type ------------------------------------------------------------------------------------------------

@@ -68,8 +68,7 @@ def test_one_point_is_found_like_many_with_and_without_a_hint():
         with_hint = network.world_to_lane_at(*point, near=(int(road[i]), float(s[i]) + 0.7))
         assert (with_hint.road, with_hint.lane) == (road[i], lane[i])
         assert (with_hint.s, with_hint.offset) == pytest.approx((s[i], offset[i]), abs=1e-10)
-        cold = network.world_to_lane_at(*point, None, float(poses.heading[i]))
-        batch = network.world_to_lane(*point, None, float(poses.heading[i]))
+        cold, batch = network.world_to_lane_at(*point), network.world_to_lane(*point)
         assert cold == pytest.approx(tuple(field.item() for field in batch), abs=1e-12)
 
 
@@ -77,8 +76,8 @@ def test_heading_chooses_between_roads_that_cross():
     network = hand_written("junction")
     right_turn, straight_on = network.index_of("west-south"), network.index_of("west-east")
     pose = network.pose_at(right_turn, -1, 8.0, 0.4)
-    assert network.world_to_lane_at(pose.x, pose.y, None, pose.heading).road == right_turn
-    assert network.world_to_lane_at(pose.x, pose.y, None, 0.1).road == straight_on
+    assert network.world_to_lane(pose.x, pose.y, None, pose.heading).road == right_turn
+    assert network.world_to_lane(pose.x, pose.y, None, 0.1).road == straight_on
 
 
 @pytest.mark.parametrize("y", [-0.5, -1.5, -2.5])
@@ -94,7 +93,7 @@ def test_where_roads_lie_on_each_other_a_point_has_gone_onto_the_one_least_bent(
 def test_a_car_on_the_wrong_side_of_its_road_is_in_the_lane_that_it_is_in():
     network = hand_written("straight")
     pose = network.pose_at(0, 1, 100.0)
-    assert network.world_to_lane_at(pose.x, pose.y, None, pose.heading + pi).lane == 1
+    assert network.world_to_lane(pose.x, pose.y, None, pose.heading + pi).lane == 1
 
 
 def test_height_chooses_between_roads_on_top_of_each_other(tmp_path):

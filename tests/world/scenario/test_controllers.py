@@ -8,8 +8,14 @@ import pytest
 
 from tests.kit.scenario_files import action, entity, made, private, speed_action, story, teleport
 from tests.kit.scenario_files import event as timed_event
-from xosc_lateral.world.scenario.controllers import Domains, DrivingControllers, kind_of
-from xosc_lateral.world.scenario.dependence import controlled_entities, dependence, vehicles_under_test
+from xosc_lateral.world.scenario.controllers import (
+    Domains,
+    DrivingControllers,
+    controlled_entities,
+    kind_of,
+    vehicles_under_test,
+)
+from xosc_lateral.world.scenario.dependence import dependence
 from xosc_lateral.world.scenario.entity import Controller
 from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.private_actions import (

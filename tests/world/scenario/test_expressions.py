@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xosc_lateral.world.scenario.expressions import ExpressionError, evaluate
+from xosc_lateral.world.scenario.parameters import ExpressionError, evaluate
 
 VALUES = {"a": "3", "b": "-2.5", "yes": "true", "name": "Ego", "v": "108.0"}
 

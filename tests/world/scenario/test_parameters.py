@@ -3,8 +3,7 @@ from __future__ import annotations
 import pytest
 
 from xosc_lateral.world.scenario.enums import Rule
-from xosc_lateral.world.scenario.expressions import ExpressionError
-from xosc_lateral.world.scenario.parameters import MAX_CHAIN, Scope, satisfies
+from xosc_lateral.world.scenario.parameters import MAX_CHAIN, ExpressionError, Scope, satisfies
 
 
 def test_parameters_may_refer_to_later_ones() -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.kit.scenario_files import action, entity, made, private, speed_action, teleport, vehicle
-from xosc_lateral.world.scenario.dependence import dependence, vehicles_under_test
+from xosc_lateral.world.scenario.controllers import vehicles_under_test
+from xosc_lateral.world.scenario.dependence import dependence
 from xosc_lateral.world.scenario.scenario import Scenario
 
 CONTROLLER = (

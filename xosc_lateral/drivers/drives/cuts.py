@@ -38,16 +38,11 @@ MIN_RUN = 10.0
 class CutRules:
     """What is cut out of a drive; the defaults are the paper's where it gives one."""
 
-    min_speed: float = MIN_SPEED
-    """[m/s]"""
-    lane_change_margin: float = LANE_CHANGE_MARGIN
-    """Cut on each side of a lane change. [s]"""
-    max_gap: float = MAX_GAP
-    """Longest gap that is bridged. [s]"""
-    min_run: float = MIN_RUN
-    """Shortest run that is kept. [s]"""
-    step: float = STEP
-    """Of the runs. [s]"""
+    min_speed: float = MIN_SPEED  # [m/s]
+    lane_change_margin: float = LANE_CHANGE_MARGIN  # Cut on each side of a lane change. [s]
+    max_gap: float = MAX_GAP  # Longest gap that is bridged. [s]
+    min_run: float = MIN_RUN  # Shortest run that is kept. [s]
+    step: float = STEP  # Of the runs. [s]
 
 
 PAPER_RULES = CutRules()
@@ -72,10 +67,10 @@ def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run
     return runs
 
 
-def whole_run(drive: Drive, step: float = STEP) -> Run:
-    """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context. [s]"""
+def whole_run(drive: Drive) -> Run:
+    """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context."""
     rows = slice(0, len(drive))
-    return _run(drive, 0, rows, grid_of(drive, rows, step))
+    return _run(drive, 0, rows, grid_of(drive, rows, STEP))
 
 
 def grid_of(drive: Drive, rows: slice, step: float) -> FloatArray:
@@ -151,10 +146,8 @@ def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]
     new = (np.diff(rows) > 1) | (np.diff(drive.time[rows]) > max_gap)
     if drive.run is not None:
         new |= np.diff(drive.run[rows]) != 0
-    ends = np.flatnonzero(new)
-    firsts = np.concatenate([[0], ends + 1])
-    lasts = np.concatenate([ends, [len(rows) - 1]])
-    return [slice(int(rows[first]), int(rows[last]) + 1) for first, last in zip(firsts, lasts, strict=True)]
+    parts = np.split(rows, np.flatnonzero(new) + 1)
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
 
 
 def _why_nothing(drives: Sequence[Drive], rules: CutRules) -> str:

@@ -18,67 +18,38 @@ class MarkingShares:
     """Rows in which a camera had misjudged a lane marking."""
 
     one_marking: float
+    # Shares of a drive's rows that follow one marking because the other was misjudged (by 5 cm of offset and more), and
+    # that were left out because both were. [-]
     no_marking: float
-    """Shares of a drive's rows that follow one marking because the other was misjudged (by 5 cm of offset and more),
-    and that were left out because both were. [-]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Drive:
-    """One drive as recorded, in clean units: finite, sorted, each time once.
+    """One drive as recorded, in clean units: finite, sorted, each time once. Arrays of shape (n,)."""
 
-    Parameters
-    ----------
-    name : str
-        Drive in the table, else the file's stem.
-    time : array, shape (n,)
-        Strictly increasing, steps may vary. [s]
-    offset : array, shape (n,)
-        From the lane centre, positive to the LEFT of travel. [m]
-    lane_width : array, shape (n,)
-        [m]
-    context : mapping of str to array, shape (n,)
-        Every other numeric column, and `speed` and `lane_width` under these names. NaN: there is none.
-    levels : frozenset of str
-        Context columns that hold a few whole numbers (lane index, flags): never averaged.
-    source : str
-        Where it was read. For messages.
-    run : array of int, shape (n,), optional
-        Number of the road-following stretch of each row, where an import has cut the drive already: lane changes and
-        their margins are gone, and none are searched again. None: nothing has been cut.
-    mended : MarkingShares, optional
-        Rows in which a camera had misjudged a marking, see `markings`.
-    empty : frozenset of str
-        Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
-        lane to that side). Of a column that the table lacks, nothing is known.
-    frozen : int
-        Rows left out because a camera had repeated itself, see `frozen`.
-    driver : str
-        Who drove, where the table says; several drives may be one driver's.
-    half_width : array, shape (n,), optional
-        Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
-        lane width comes from a map, or from elsewhere than the offset. [m]
-    valid_below : float, optional
-        Frequency below which the recording shows driving, where it is known. [Hz]
-    resolution : float, optional
-        Step or noise of the offsets, where it is known. [m]
-    """
-
-    name: str
-    time: FloatArray
-    offset: FloatArray
-    lane_width: FloatArray
+    name: str  # Drive in the table, else the file's stem.
+    time: FloatArray  # Strictly increasing, steps may vary. [s]
+    offset: FloatArray  # From the lane centre, positive to the LEFT of travel. [m]
+    lane_width: FloatArray  # [m]
+    # Every other numeric column, and `speed` and `lane_width` under these names. NaN: there is none.
     context: Mapping[str, FloatArray] = field(default_factory=dict)
+    # Context columns that hold a few whole numbers (lane index, flags): never averaged.
     levels: frozenset[str] = frozenset()
-    source: str = ""
+    source: str = ""  # Where it was read. For messages.
+    # Number of each row's road-following stretch, where an import has cut the drive already: lane changes and their
+    # margins are gone, and none are searched again. None: nothing has been cut.
     run: IntArray | None = None
-    mended: MarkingShares | None = None
+    mended: MarkingShares | None = None  # Rows in which a camera had misjudged a marking, see `markings`.
+    # Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no lane
+    # to that side). Of a column that the table lacks, nothing is known.
     empty: frozenset[str] = frozenset()
+    # Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the lane
+    # width comes from a map, or from elsewhere than the offset. [m]
     half_width: FloatArray | None = None
-    valid_below: float | None = None
-    resolution: float | None = None
-    driver: str = ""
-    frozen: int = 0
+    valid_below: float | None = None  # Frequency below which the recording shows driving, where it is known. [Hz]
+    resolution: float | None = None  # Step or noise of the offsets, where it is known. [m]
+    driver: str = ""  # Who drove, where the table says; several drives may be one driver's.
+    frozen: int = 0  # Rows left out because a camera had repeated itself, see `frozen_rows`.
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -99,21 +70,14 @@ class Drive:
 class Run:
     """Road-following driving on an even grid, arrays of shape (n,); nothing may be counted across two runs."""
 
-    drive: str
-    """Name of the drive that it comes from."""
-    index: int
-    """Number of the run in its drive, from 0."""
-    time: FloatArray
-    """Even, in the drive's own clock. [s]"""
-    offset: FloatArray
-    """Positive to the LEFT of travel. [m]"""
-    lane_width: FloatArray
-    """[m]"""
-    context: Mapping[str, FloatArray] = field(default_factory=dict)
-    """As in `Drive`."""
+    drive: str  # Name of the drive that it comes from.
+    index: int  # Number of the run in its drive, from 0.
+    time: FloatArray  # Even, in the drive's own clock. [s]
+    offset: FloatArray  # Positive to the LEFT of travel. [m]
+    lane_width: FloatArray  # [m]
+    context: Mapping[str, FloatArray] = field(default_factory=dict)  # As in `Drive`.
     levels: frozenset[str] = frozenset()
-    empty: frozenset[str] = frozenset()
-    """As in `Drive`, as are the next two."""
+    empty: frozenset[str] = frozenset()  # As in `Drive`, as are the next two.
     valid_below: float | None = None
     resolution: float | None = None
 
@@ -125,7 +89,7 @@ class Run:
         """Some of its rows, under its drive's name or another."""
         return replace(
             self,
-            drive=self.drive if drive is None else drive,
+            drive=drive or self.drive,
             time=self.time[rows],
             offset=self.offset[rows],
             lane_width=self.lane_width[rows],

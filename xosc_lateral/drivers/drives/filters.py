@@ -98,12 +98,14 @@ def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
 
 
 class Detrend(Enum):
-    """What is taken out of a window before it is transformed."""
+    """What is taken out of a window before it is transformed.
+
+    Of its ends, the straight line through both: what drifts slowly then leaks into no frequency.
+    """
 
     NOTHING = "nothing"
     MEAN = "mean"
     ENDS = "ends"
-    """The straight line through its first and its last value: what drifts slowly then leaks into no frequency."""
 
 
 def hann(size: int) -> FloatArray:
@@ -121,12 +123,7 @@ def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NO
     if values.shape[-1] < size:
         return np.empty((0, size // 2 + 1))
     windows = np.lib.stride_tricks.sliding_window_view(values, size, axis=-1)[..., :: max(1, size // 2), :]
-    return window_powers(windows.reshape(-1, size), detrend=detrend)
-
-
-def window_powers(pieces: FloatArray, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:
-    """Power of Hann windows, one per row: shape (k, size) to (k, size // 2 + 1); see `periodograms`."""
-    size = pieces.shape[1]
+    pieces = windows.reshape(-1, size)
     if detrend is Detrend.MEAN:
         pieces = pieces - pieces.mean(axis=1, keepdims=True)
     elif detrend is Detrend.ENDS:

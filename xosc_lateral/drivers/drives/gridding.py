@@ -43,18 +43,12 @@ class GriddedDrive:
     """One drive on the 0.2 s grid, arrays of shape (n,); context holds its outermost values in the pads around it."""
 
     name: str
-    time: FloatArray
-    """The drive's own clock. [s]"""
-    offset: FloatArray
-    """Positive to the LEFT of travel; 0 outside `valid`. [m]"""
-    valid: BoolArray
-    """Road-following, not cut out."""
-    lane_width: FloatArray
-    """[m]"""
-    context: Mapping[str, FloatArray]
-    """NaN: there is none."""
-    levels: frozenset[str]
-    """Columns of whole numbers."""
+    time: FloatArray  # The drive's own clock. [s]
+    offset: FloatArray  # Positive to the LEFT of travel; 0 outside `valid`. [m]
+    valid: BoolArray  # Road-following, not cut out.
+    lane_width: FloatArray  # [m]
+    context: Mapping[str, FloatArray]  # NaN: there is none.
+    levels: frozenset[str]  # Columns of whole numbers.
 
     def __len__(self) -> int:
         return len(self.time)
@@ -80,11 +74,22 @@ def grid_drives(
     With at least `pad` rows before and after each drive; each one's rows are a multiple of `multiple`, and all of them
     together a number whose Fourier transform is quick.
     """
+    from scipy.fft import next_fast_len
+
     periods = circular_columns(drives)
     cut = [(drive, cut_runs(drive, rules)) for drive in drives]
-    kept = [_with_room(_gridded(drive, runs, frozenset(periods)), pad, multiple) for drive, runs in cut if runs]
+    kept = []
+    for drive, runs in cut:
+        if runs:
+            part = _gridded(drive, runs, frozenset(periods))
+            rows = -(-(len(part) + 2 * pad) // multiple) * multiple
+            time = part.time[0] + STEP * (np.arange(rows) - pad)
+            kept.append(part.padded(pad, rows - len(part) - pad, time))
     if kept:
-        kept[-1] = _lengthened(kept[-1], sum(map(len, kept)), multiple)
+        last, total = kept[-1], sum(map(len, kept))
+        more = multiple * next_fast_len(total // multiple, real=True) - total
+        later = last.time[-1] + STEP * np.arange(1, more + 1)
+        kept[-1] = last.padded(0, more, np.concatenate([last.time, later]))
     return kept, periods
 
 
@@ -110,16 +115,3 @@ def _gridded(drive: Drive, runs: Sequence[Run], circular: frozenset[str]) -> Gri
     }
     lane_width = in_digits(average(drive.time, drive.lane_width, grid))
     return GriddedDrive(drive.name, grid, offset, valid, lane_width, context, drive.levels)
-
-
-def _with_room(part: GriddedDrive, pad: int, multiple: int) -> GriddedDrive:
-    total = -(-(len(part) + 2 * pad) // multiple) * multiple
-    return part.padded(pad, total - len(part) - pad, part.time[0] + STEP * (np.arange(total) - pad))
-
-
-def _lengthened(part: GriddedDrive, total: int, multiple: int) -> GriddedDrive:
-    """Pad the last drive until the coarse grid has a length whose Fourier transform is quick."""
-    from scipy.fft import next_fast_len
-
-    more = multiple * next_fast_len(total // multiple, real=True) - total
-    return part.padded(0, more, np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]))

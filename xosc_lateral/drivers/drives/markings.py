@@ -39,7 +39,7 @@ WIDENING = 3e-4
 """Of the lane: 0.02 m within a second, 0.1 m within 40 s (`docs/design/markings.md` shows how little either matters).
 [m2/s]"""
 
-MEASURED = 0.01
+CAMERA_NOISE = 0.01
 """A lane width that wavers by less (standard deviation of each marking) comes from a map, not from a camera. [m]"""
 
 LEAST_NOISE = 0.05
@@ -69,10 +69,8 @@ class Mended:
     """Rows with a misjudged marking seen through."""
 
     offset: FloatArray
-    lane_width: FloatArray
-    """Shape (n,). The lane width smoothed. [m]"""
-    kept: BoolArray
-    """Shape (n,). Rows with a view to trust."""
+    lane_width: FloatArray  # Shape (n,). The lane width smoothed. [m]
+    kept: BoolArray  # Shape (n,). Rows with a view to trust.
     shares: MarkingShares
 
 
@@ -99,7 +97,7 @@ def both_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) 
         return None
     about = np.abs(width - median_filter(width, size=WAVERS_WITHIN, mode="nearest"))
     noise = MAD_TO_SD * float(np.median(about)) / np.sqrt(2.0)
-    if noise < MEASURED:
+    if noise < CAMERA_NOISE:
         return None
     borders = block[np.flatnonzero(breaks)]
     return BothMarkings(
@@ -112,21 +110,14 @@ class BothMarkings:
     """What a camera saw of both lane markings: rows, and medians of blocks of `STEP`."""
 
     offset: FloatArray
-    lane_width: FloatArray
-    """As recorded, shape (n,). [m]"""
-    moment: FloatArray
-    """Of the rows, see `_blocks`. [s]"""
+    lane_width: FloatArray  # As recorded, shape (n,). [m]
+    moment: FloatArray  # Of the rows, see `_blocks`. [s]
     left: FloatArray
-    right: FloatArray
-    """Distances of blocks to both markings. [m]"""
-    seen: BoolArray
-    """Blocks that have rows."""
-    breaks: IntArray
-    """Blocks after which the next is not joined."""
-    gaps: FloatArray
-    """Times between the rows on both sides of these. [s]"""
-    noise: float
-    """Of a marking, standard deviation. [m]"""
+    right: FloatArray  # Distances of blocks to both markings. [m]
+    seen: BoolArray  # Blocks that have rows.
+    breaks: IntArray  # Blocks after which the next is not joined.
+    gaps: FloatArray  # Times between the rows on both sides of these. [s]
+    noise: float  # Of a marking, standard deviation. [m]
 
     def mended(self) -> Mended | None:
         """With the other marking followed where one was misjudged; None where nothing is impossible."""
@@ -135,8 +126,10 @@ class BothMarkings:
             return None
         centres = STEP * (np.arange(len(self.left)) + 0.5)
         place, lane = (np.interp(self.moment, centres, values) for values in smoothed)
-        wider = self.lane_width - lane
-        left, right = _trust(self.offset - place, wider)
+        wider, moved = self.lane_width - lane, self.offset - place
+        errors = (0.5 * wider - moved, 0.5 * wider + moved)  # of the rows' views of both markings
+        noise = max(MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors)))), CAMERA_NOISE)
+        left, right = (_weights(error / noise) for error in errors)
         change = 0.5 * wider * (right - left) / (left + right)
         kept = 0.5 * (left + right) >= LEAST_TRUST
         shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MENDED_OFFSET_CHANGE))), float(np.mean(~kept)))
@@ -194,13 +187,6 @@ class BothMarkings:
         wanted[1::2] = 0.5 * (right * self.right + left * self.left)
         widths = solveh_banded(bands, wanted, lower=True)
         return widths[::2], widths[1::2]
-
-
-def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weights of the rows' views of the left and the right marking, from their errors in offset and lane width. [m]"""
-    errors = (0.5 * width - offset, 0.5 * width + offset)
-    noise = max(MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors)))), MEASURED)
-    return _weights(errors[0] / noise), _weights(errors[1] / noise)
 
 
 def _weights(scaled: FloatArray) -> FloatArray:

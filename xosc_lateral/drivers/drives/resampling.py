@@ -14,9 +14,8 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.filters import low_pass_between, mirrored
 
 STEP = 0.2
@@ -67,31 +66,21 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArra
     if _is_sparse(time, grid):
         result = np.interp(grid, time[~missing], values[~missing])
     else:
-        result = _hann_average(time, values, missing, grid)
+        points = _points(time, grid)
+        kernel, fine_grid = np.hanning(2 * points + 1), _fine_grid(grid, points)
+        weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
+        fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
+        sums, weights = (_decimate(np.pad(part, points), kernel, len(grid), points) for part in (fine, weight))
+        result = sums / np.where(weights > 0, weights, 1.0)
     closest = nearest(time, values, grid)
     return np.where(np.isfinite(closest), result, closest)
 
 
-def _hann_average(time: FloatArray, values: FloatArray, missing: BoolArray, grid: FloatArray) -> FloatArray:
-    """Over one step to each side, shape of `grid`, of what is there; 0 where nothing is."""
-    points = _points(time, grid)
-    kernel, fine_grid = np.hanning(2 * points + 1), _fine_grid(grid, points)
-    weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
-    fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
-    sums, weights = (_decimate(np.pad(part, points), kernel, len(grid), points) for part in (fine, weight))
-    return np.asarray(sums / np.where(weights > 0, weights, 1.0))
-
-
 def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
     """Value [unit of the column] of the row nearest in time [s], shape of `grid`."""
-    return values[nearest_rows(time, grid)]
-
-
-def nearest_rows(time: FloatArray, grid: FloatArray) -> NDArray[np.intp]:
-    """The row nearest in time, shape of `grid`; both [s]."""
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(grid), dtype=int)
     left = np.maximum(right - 1, 0)
-    return np.where(grid - time[left] <= time[right] - grid, left, right)
+    return values[np.where(grid - time[left] <= time[right] - grid, left, right)]
 
 
 def in_digits(values: FloatArray) -> FloatArray:

@@ -10,12 +10,9 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.model.linear_filters import prepare
+from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.sampling import sample_offsets
-from xosc_lateral.drivers.model.seeds import child
 
 NEAR_MARKING = 1.2  # A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]
 
@@ -62,13 +59,8 @@ def time_to_line_crossing(
 
 # Columns of `lane_keeping_indicators`.
 INDICATORS = (
-    "sdlp",
-    "tlc_min",
-    "tlc_median",
-    "beyond_wandering_zone",
-    "near_marking",
-    "lateral_acceleration",
-    "lateral_jerk",
+    *("sdlp", "tlc_min", "tlc_median", "beyond_wandering_zone", "near_marking"),
+    *("lateral_acceleration", "lateral_jerk"),
 )
 
 UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
@@ -76,9 +68,7 @@ UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
 WANDERING_ZONE = 0.375
 
 
-def lane_keeping_indicators(
-    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
-) -> FloatArray:
+def lane_keeping_indicators(offset: FloatArray, lane_width: FloatArray, step: float) -> FloatArray:
     """Indicators of each window, shape (n, 7), from `offset` and `lane_width`, shape (n, m >= 4) [m].
 
     Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and median
@@ -92,7 +82,7 @@ def lane_keeping_indicators(
        crossing (TLC) during car driving", Accident Analysis & Prevention 32, 2000: here distance over lateral speed.
     .. [3] UN Regulation No. 157, guidance on performance models, cut-in scenario.
     """
-    crossing = time_to_line_crossing(offset, lane_width, step, half_width=half_width)
+    crossing = time_to_line_crossing(offset, lane_width, step)
     acceleration = np.diff(offset, 2, axis=1) / step**2
     jerk = np.diff(offset, 3, axis=1) / step**3
     near = np.abs(offset) > 0.5 * lane_width - NEAR_MARKING
@@ -198,10 +188,7 @@ def highway_drives(
     profile: DriverProfile, seed: int, *, speed: float = HIGHWAY_SPEED, drives: int = HIGHWAY_DRIVES
 ) -> FloatArray:
     """Offsets of drives of an hour in even traffic, each a driver of his own, shape (drives, n); `speed` in [m/s]."""
-    segment = Segment.even(HIGHWAY_DRIVE, profile.model.step, profile.lane_width, speed)
-    root = np.random.SeedSequence(seed)
-    prepare(drives * len(segment))
-    return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drives)])
+    return free_runs(profile, seed, drivers=drives, duration=HIGHWAY_DRIVE, speed=speed)
 
 
 def lane_keeping(

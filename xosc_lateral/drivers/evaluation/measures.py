@@ -94,16 +94,12 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
         "metrics": float(np.mean(column_distances(real.metrics[rows], other.metrics[other_rows]))),
         "lane_keeping": float(np.mean(column_distances(real.indicators[rows], other.indicators[other_rows]))),
     }
-    if not real.power.shape[1]:  # too short for any band
-        return families | _memory_difference(real, other, rows, other_rows)
-    level, beside = real.power[rows].mean(axis=0) + MINIMUM_POWER, other.power[other_rows].mean(axis=0) + MINIMUM_POWER
-    families["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
-    return families | _memory_difference(real, other, rows, other_rows)
-
-
-def _memory_difference(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
+    if real.power.shape[1]:  # else too short for any band
+        level = real.power[rows].mean(axis=0) + MINIMUM_POWER
+        beside = other.power[other_rows].mean(axis=0) + MINIMUM_POWER
+        families["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
     reference, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
-    return {"memory": float(np.sqrt(np.mean((reference - others) ** 2)))}
+    return families | {"memory": float(np.sqrt(np.mean((reference - others) ** 2)))}
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:
@@ -140,12 +136,11 @@ def windows_with_the_same_start(
     rng: np.random.Generator,
     *,
     count: int = 1,
-    nearest: int = NEIGHBOUR_COUNT,
 ) -> IntArray:
     """For each window `count` others by other drivers that start at nearly the same offset: rows, shape (n, count).
 
-    Drawn among the `nearest`; a driver's own windows are never taken. Raises `NotEnoughDataError` when other drivers
-    have fewer than `count` windows.
+    Drawn among the nearest `NEIGHBOUR_COUNT`; a driver's own windows are never taken. Raises `NotEnoughDataError` when
+    other drivers have fewer than `count` windows.
     """
     chosen = np.empty((len(starts), count), dtype=np.int64)
     for row, (start, driver) in enumerate(zip(starts.tolist(), drivers.tolist(), strict=True)):
@@ -153,7 +148,7 @@ def windows_with_the_same_start(
         if len(others) < count:
             raise NotEnoughDataError(f"{len(others)} windows of other drivers than {driver}; {count} are needed")
         gaps = np.abs(donor_starts[others] - start)
-        pool = others[np.argpartition(gaps, min(nearest, len(others)) - 1)[:nearest]]
+        pool = others[np.argpartition(gaps, min(NEIGHBOUR_COUNT, len(others)) - 1)[:NEIGHBOUR_COUNT]]
         chosen[row] = rng.permutation(pool)[:count]
     return chosen
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
@@ -76,10 +77,13 @@ SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
 DRIVERS, DURATION = 60, 300.0
 
 
-def free_runs(profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION) -> FloatArray:
+def free_runs(
+    profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION, speed: float = SPEED
+) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
-    segment = Segment.even(duration, profile.model.step, profile.lane_width, SPEED)
+    segment = Segment.even(duration, profile.model.step, profile.lane_width, speed)
     root = np.random.SeedSequence(seed)
+    prepare(drivers * len(segment))
     return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drivers)])
 
 
@@ -152,6 +156,7 @@ def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArr
 
 
 SCORE_UNITS = {"energy_score": "m", "variogram_score": "m"}  # Proper scores and their units.
+PAIRED_EVERY = 5  # Steps between the values that are paired: all pairs of a window of 51 values would be 2601. [-]
 ORDER = 0.5  # Of the variogram score: the power that its authors found most sensitive to dependence. [-]
 
 
@@ -170,10 +175,8 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     return np.asarray(scoringrules.es_ensemble(real, ensemble, estimator="fair"), dtype=np.float64)
 
 
-def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -> FloatArray:
+def variogram_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Variogram score of each window, as `energy_score`: sees how values depend on one another. [m]
-
-    `every`: steps between the values that are paired: all pairs of a window of 51 values would be 2601.
 
     References
     ----------
@@ -183,7 +186,7 @@ def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -
     import scoringrules
 
     _check(ensemble)
-    thin, members = real[:, ::every], ensemble[:, :, ::every]
+    thin, members = real[:, ::PAIRED_EVERY], ensemble[:, :, ::PAIRED_EVERY]
     pairs = thin.shape[1] ** 2
     return np.asarray(scoringrules.vs_ensemble(thin, members, p=ORDER, estimator="fair") / pairs, dtype=np.float64)
 

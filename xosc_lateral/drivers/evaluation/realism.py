@@ -14,39 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.evaluation import measures, snippets, spectra
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.drivers.evaluation.measures import (
-    FLOOR_DRAWS,
-    UNITS,
-    Features,
-    differences,
-    features_of,
-    named_distances,
-    named_means,
-    real_against_real,
-    windows_with_the_same_start,
-)
 from xosc_lateral.drivers.evaluation.metrics import SCORE_UNITS, proper_scores, split_groups
-from xosc_lateral.drivers.evaluation.snippets import (
-    LENGTHS,
-    SnippetCondition,
-    Snippets,
-    sample_runs,
-    sample_snippets,
-    sensor_noise,
-    snippets_of,
-)
-from xosc_lateral.drivers.evaluation.spectra import (
-    PASS_FREQUENCY,
-    STOP_FREQUENCY,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-    thinned,
-)
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 
@@ -138,32 +111,31 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
 
     `runs`: measured, at the profile's step; `classify`: whether to train classifiers too, most of the work.
     """
-    step, below, resolution = profile.model.step, comparison_band(runs), resolution_of(runs)
-    driver = sample_runs(profile, runs, seed, same_start=False)
-    noise = sensor_noise(profile, driver, seed)
-    real = dithered([run.offset for run in runs], resolution, seed + 2)
-    driver = dithered(driver, resolution, seed + 3)
+    step, below, resolution = profile.model.step, spectra.comparison_band(runs), spectra.resolution_of(runs)
+    driver = snippets.sample_runs(profile, runs, seed, same_start=False)
+    noise = snippets.sensor_noise(profile, driver, seed)
+    real = spectra.dithered([run.offset for run in runs], resolution, seed + 2)
+    driver = spectra.dithered(driver, resolution, seed + 3)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
-    slow_real, slow_driver = ([slow_movement(path, step, below) for path in paths] for paths in (real, driver))
+    slow_real, slow_driver = ([spectra.slow_movement(path, step, below) for path in paths] for paths in (real, driver))
     conditions = []
-    for seconds in LENGTHS:
-        cut = snippets_of(runs, seconds, step)
+    for seconds in snippets.LENGTHS:
+        cut = snippets.snippets_of(runs, seconds, step)
         if len(cut) < MINIMUM_GROUPS or len(np.unique(cut.group)) < 2:
             continue
         slow = SnippetCondition(seconds, False, slow=True, below=below)
         pairs = [(slow, cut.cut_from(slow_real), cut.cut_from(slow_driver))]
-        if below == STOP_FREQUENCY:  # a recording that is valid to less shows nothing else
-            same = np.array(
-                dithered(list(sample_snippets(profile, cut, seed + 1, with_sensor=True)), resolution, seed + 4)
-            )
+        if below == spectra.STOP_FREQUENCY:  # a recording that is valid to less shows nothing else
+            same_start = snippets.sample_snippets(profile, cut, seed + 1, with_sensor=True)
+            same = np.array(spectra.dithered(list(same_start), resolution, seed + 4))
             pairs.insert(0, (SnippetCondition(seconds, False), cut.cut_from(real), cut.cut_from(recorded)))
             pairs.insert(0, (SnippetCondition(seconds, True), cut.cut_from(real), same))
         conditions += [
             _under(condition, cut, measured, sampled, profile, seed, classify) for condition, measured, sampled in pairs
         ]
-    short = snippets_of(runs, LENGTHS[0], step)
+    short = snippets.snippets_of(runs, snippets.LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
-    if conditions and conditions[0].condition == SnippetCondition(LENGTHS[0], True):
+    if conditions and conditions[0].condition == SnippetCondition(snippets.LENGTHS[0], True):
         conditions[0] = _with_proper_scores(conditions[0], profile, short, seed)
     return Realism(
         tuple(conditions), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose)
@@ -184,14 +156,14 @@ def _under(
 ) -> ConditionScores:
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
-    highest = PASS_FREQUENCY / STOP_FREQUENCY * condition.below if condition.slow else np.inf
-    measured = features_of(real, cut.lane_width, step, highest=highest)
-    made = features_of(sampled, cut.lane_width, step, highest=highest)
+    highest = spectra.PASS_FREQUENCY / spectra.STOP_FREQUENCY * condition.below if condition.slow else np.inf
+    measured = measures.features_of(real, cut.lane_width, step, highest=highest)
+    made = measures.features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, measured, made, real, cut.group, seed)
     alone = jointly = floor = None
     shown = (real, sampled)
     if condition.slow:
-        shown = thinned(real, step, condition.below), thinned(sampled, step, condition.below)
+        shown = spectra.thinned(real, step, condition.below), spectra.thinned(sampled, step, condition.below)
     if classify and shown[0].shape[1] >= MINIMUM_ROWS:
         fast, group = not condition.slow, cut.group
         alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)
@@ -202,14 +174,14 @@ def _under(
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
-    with_sensor, means = profile.sensor is not None and not condition.slow, named_means(measured, made)
+    with_sensor, means = profile.sensor is not None and not condition.slow, measures.named_means(measured, made)
     return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(
     condition: SnippetCondition,
-    measured: Features,
-    made: Features,
+    measured: measures.Features,
+    made: measures.Features,
     real: FloatArray,
     group: NDArray[np.str_],
     seed: int,
@@ -220,13 +192,17 @@ def _distances(
     for _ in range(SPLITS):
         half = split_groups(group, rng)
         rows, others = np.flatnonzero(half), np.flatnonzero(~half)
-        stand_ins = _stand_ins(real, group, rows, others, rng) if condition.same_start else None
-        values.append(differences(measured, made, rows, rows))
-        floors.append(real_against_real(measured, measured, rows, others, stand_ins))
-        named.append(named_distances(measured.take(rows), made.take(rows)))
+        stand_ins = None
+        if condition.same_start:  # other drivers' snippets that start there too
+            count, first = min(measures.FLOOR_DRAWS, len(others)), real[:, 0]
+            starts = first[rows], group[rows], first[others], group[others]
+            stand_ins = others[measures.windows_with_the_same_start(*starts, rng, count=count)]
+        values.append(measures.differences(measured, made, rows, rows))
+        floors.append(measures.real_against_real(measured, measured, rows, others, stand_ins))
+        named.append(measures.named_distances(measured.take(rows), made.take(rows)))
         beside = others if stand_ins is None else stand_ins[:, 0]
-        named_floors.append(named_distances(measured.take(rows), measured.take(beside)))
-    return _beside(values, floors, UNITS), _beside(named, named_floors, {})
+        named_floors.append(measures.named_distances(measured.take(rows), measured.take(beside)))
+    return _beside(values, floors, measures.UNITS), _beside(named, named_floors, {})
 
 
 def _beside(
@@ -238,22 +214,13 @@ def _beside(
     return {name: Beside(mean(values, name), mean(floors, name), units.get(name, "sd")) for name in values[0]}
 
 
-def _stand_ins(
-    real: FloatArray, group: NDArray[np.str_], rows: IntArray, others: IntArray, rng: np.random.Generator
-) -> IntArray:
-    """Other drivers' snippets with the same start, shape (rows, draws)."""
-    count, first = min(FLOOR_DRAWS, len(others)), real[:, 0]
-    donors = windows_with_the_same_start(first[rows], group[rows], first[others], group[others], rng, count=count)
-    return others[donors]
-
-
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
     """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
     chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
     some = cut.take(chosen)
-    members = [sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
+    members = [snippets.sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
     rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
-    drivers = windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
+    drivers = measures.windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
     sampled = proper_scores(some.offset, np.stack(members, axis=1))
     real = proper_scores(some.offset, cut.offset[drivers])
     added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}

@@ -6,16 +6,20 @@ the fair measure (`realism`), beside them spectrum, autocorrelation and the lane
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.lane_keeping import Margins, margins
+from xosc_lateral.drivers.evaluation import spectra
+from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins, margins
 from xosc_lateral.drivers.evaluation.metrics import (
     METRICS,
     Distances,
@@ -24,7 +28,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     snippet_metrics,
     split_groups,
 )
-from xosc_lateral.drivers.evaluation.realism import Realism, score_realism
+from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, Realism, score_realism
 from xosc_lateral.drivers.evaluation.snippets import (
     PartEvaluation,
     SnippetCondition,
@@ -35,17 +39,6 @@ from xosc_lateral.drivers.evaluation.snippets import (
     sensor_noise,
     snippets_of,
 )
-from xosc_lateral.drivers.evaluation.spectra import (
-    STOP_FREQUENCY,
-    Spectrum,
-    autocorrelation,
-    comparison_band,
-    dithered,
-    resolution_of,
-    slow_movement,
-    spectrum,
-)
-from xosc_lateral.drivers.evaluation.verdict import Verdict, verdict_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 SNIPPET = 10.0  # The paper's. [s]
@@ -122,12 +115,12 @@ class ProfileScores:
     runs: int
     hours: float
     realism: Realism  # The headline: free runs and shared starts beside other real drivers.
-    verdict: Verdict  # Up to which frequency free runs are like other real drivers.
+    verdict: spectra.Verdict  # Up to which frequency free runs are like other real drivers.
     snippets: SnippetScores  # 10 s.
     long_snippets: SnippetScores | None  # 60 s; None with fewer than `MIN_SNIPPETS`.
     evaluations: tuple[PartEvaluation, ...]
-    spectrum_real: Spectrum
-    spectrum_sampled: Spectrum
+    spectrum_real: spectra.Spectrum
+    spectrum_sampled: spectra.Spectrum
     lags: FloatArray  # shape (k,). [s]
     autocorrelation_real: FloatArray  # shape (k,). [-]
     autocorrelation_sampled: FloatArray  # shape (k,). [-]
@@ -136,7 +129,7 @@ class ProfileScores:
     traces: tuple[Trace, ...]  # The longest run of each of the first `TRACES` drives, for the eye.
     seed: int
     # Movement below this alone was compared in `snippets` and `realism`: 0.5 Hz or, of free runs, less. [Hz]
-    below: float = STOP_FREQUENCY
+    below: float = spectra.STOP_FREQUENCY
 
     @property
     def classifier_auc(self) -> float | None:
@@ -148,7 +141,7 @@ class ProfileScores:
     def spectrum_error(self) -> float:
         """Root mean square of the spectra's difference over the bands that the recording is valid in. [dB]"""
         real = self.spectrum_real
-        common = len(real.density) if self.below == STOP_FREQUENCY else int((real.frequency < self.below).sum())
+        common = len(real.density) if self.below == spectra.STOP_FREQUENCY else int((real.frequency < self.below).sum())
         ratio = self.spectrum_sampled.density[:common] / real.density[:common]
         return float(np.sqrt(np.mean((10.0 * np.log10(ratio)) ** 2)))
 
@@ -158,7 +151,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
 
     Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s. `classify`: train the classifiers too.
     """
-    step, below = profile.model.step, comparison_band(runs)
+    step, below = profile.model.step, spectra.comparison_band(runs)
     short = snippets_of(runs, SNIPPET, step)
     if len(short) < MIN_SNIPPETS:
         raise NotEnoughDataError(
@@ -171,9 +164,9 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     offsets = [run.offset for run in runs]
     lags = [round(lag / step) for lag in LAGS]
     slow = None
-    if below < STOP_FREQUENCY:
+    if below < spectra.STOP_FREQUENCY:
         unbound = sample_runs(profile, runs, seed + 2, same_start=False)
-        slow = tuple([slow_movement(path, step, below) for path in paths] for paths in (offsets, unbound))
+        slow = tuple([spectra.slow_movement(path, step, below) for path in paths] for paths in (offsets, unbound))
 
     def scored(cut: Snippets, made: FloatArray, seconds: float) -> SnippetScores:
         real = cut.offset
@@ -193,11 +186,11 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         snippets=scored(short, sampled, SNIPPET),
         long_snippets=long_scores,
         evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
-        spectrum_real=spectrum(offsets, step),
-        spectrum_sampled=spectrum(free, step),
+        spectrum_real=spectra.spectrum(offsets, step),
+        spectrum_sampled=spectra.spectrum(free, step),
         lags=np.array(LAGS),
-        autocorrelation_real=autocorrelation(offsets, lags),
-        autocorrelation_sampled=autocorrelation(free, lags),
+        autocorrelation_real=spectra.autocorrelation(offsets, lags),
+        autocorrelation_sampled=spectra.autocorrelation(free, lags),
         margins_real=margins(offsets, widths, step),
         margins_sampled=margins(free, widths, step),
         traces=_traces(runs, free, step),
@@ -207,18 +200,18 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     )
 
 
-def _verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> Verdict:
+def _verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> spectra.Verdict:
     """Free runs with the profile's sensor beside the measured ones, both at the recording's resolution."""
-    step, resolution = profile.model.step, resolution_of(runs)
+    step, resolution = profile.model.step, spectra.resolution_of(runs)
     free = sample_runs(profile, runs, seed + 5, same_start=False)
     recorded = [path + error for path, error in zip(free, sensor_noise(profile, free, seed + 5), strict=True)]
     drives = {run.drive for run in runs}
     groups = [run.drive if len(drives) > 1 else f"{run.drive} {run.index}" for run in runs]
     measured = [
         replace(run, offset=path)
-        for run, path in zip(runs, dithered([run.offset for run in runs], resolution, seed + 6), strict=True)
+        for run, path in zip(runs, spectra.dithered([run.offset for run in runs], resolution, seed + 6), strict=True)
     ]
-    return verdict_of(measured, dithered(recorded, resolution, seed + 7), groups, step)
+    return spectra.verdict_of(measured, spectra.dithered(recorded, resolution, seed + 7), groups, step)
 
 
 def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> tuple[Trace, ...]:
@@ -231,3 +224,121 @@ def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> 
         Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
         for drive, k in list(longest.items())[:TRACES]
     )
+
+
+# ---- Scores as plain values: what `evaluate --json` prints ----
+def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
+    """Plain JSON values, for `--json` and for a profile's provenance (without the single snippets)."""
+    return {
+        "profile": scores.profile,
+        "seed": scores.seed,
+        "drives": scores.drives,
+        "runs": scores.runs,
+        "hours": round(scores.hours, 4),
+        "verdict": {
+            "words": scores.verdict.in_words(),
+            "like_up_to_hz": scores.verdict.like_up_to,
+            "bands": [
+                {
+                    "low_hz": band.low,
+                    "high_hz": band.high,
+                    "ratio": significant(band.ratio, 3),
+                    "error": round(band.error, 3),
+                    "is_like": band.is_like,
+                }
+                for band in scores.verdict.bands
+            ],
+            "alarms_per_hour": {
+                f"{speed:g}": {
+                    "real": round(real, 1) if scores.verdict.shows_alarms else None,
+                    "sampled": round(made, 1),
+                }
+                for speed, (real, made) in scores.verdict.alarms.items()
+            },
+        },
+        "compared_below_hz": scores.below,
+        "realism": [_condition_to_dict(each) for each in scores.realism.conditions],
+        "variance_m2": {
+            side: {
+                "between_drivers": round(parts.between, 6),
+                "within_drivers": round(parts.within, 6),
+                "inside_snippets": round(parts.inside, 6),
+            }
+            for side, parts in (("real", scores.realism.variance_real), ("sampled", scores.realism.variance_sampled))
+        },
+        "snippets": _snippets_to_dict(scores.snippets),
+        "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
+        "evaluations": [
+            {
+                "number": each.number,
+                "coarse": each.coarse,
+                "fine": each.fine,
+                "distances": _rounded(each.distances.by_metric),
+            }
+            for each in scores.evaluations
+        ],
+        "spectrum": {
+            "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
+            "real_m2_per_hz": list(all_significant(scores.spectrum_real.density, 4)),
+            "sampled_m2_per_hz": list(all_significant(scores.spectrum_sampled.density, 4)),
+            "error_db": round(scores.spectrum_error, 3),
+        },
+        "autocorrelation": {
+            "lag_s": list(LAGS),
+            "real": [round(float(v), 4) for v in scores.autocorrelation_real],
+            "sampled": [round(float(v), 4) for v in scores.autocorrelation_sampled],
+        },
+        "margins": {
+            side: {
+                "share_near_marking": round(used.share_near, 5),
+                "excursions_per_hour": round(used.excursions_per_hour, 2),
+                "largest_offset_m": round(used.largest, 3),
+            }
+            for side, used in (("real", scores.margins_real), ("sampled", scores.margins_sampled))
+        },
+        "classifier_auc": None if scores.classifier_auc is None else round(scores.classifier_auc, 4),
+    }
+
+
+def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
+    worst, ratio = scores.worst_ratio
+    return {
+        "seconds": scores.seconds,
+        "count": scores.count,
+        "distance": _rounded(scores.distances.by_metric),
+        "floor": _rounded(scores.floor.by_metric),
+        "mean_distance": round(scores.distances.mean, 4),
+        "mean_floor": round(scores.floor.mean, 4),
+        "mean_ratio": round(scores.ratio, 3),
+        "worst_metric": worst,
+        "worst_ratio": round(ratio, 3),
+    }
+
+
+def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
+    areas = {"movement": scores.alone, "with_context": scores.jointly, "real_drivers": scores.floor}
+    return {
+        "seconds": scores.condition.seconds,
+        "start": "same" if scores.condition.same_start else "free",
+        "band": f"below {scores.condition.below:g} Hz" if scores.condition.slow else "all",
+        "sampled": "driver and sensor" if scores.with_sensor else "driver",
+        "count": scores.count,
+        "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in scores.families.items()},
+        "distances": {name: _beside_to_dict(value) for name, value in scores.named.items()},
+        "indicators": {
+            name: {"real": round(real, 5), "sampled": round(sampled, 5), "unit": unit}
+            for (name, (real, sampled)), unit in zip(scores.means.items(), UNITS, strict=True)
+        },
+        "auc": None
+        if scores.alone is None
+        else {name: None if area is None else _rounded(asdict(area)) for name, area in areas.items()},
+    }
+
+
+def _beside_to_dict(number: Beside) -> dict[str, float | None]:
+    ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
+    return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio}
+
+
+def _rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, 4) for name, value in values.items()}

@@ -74,7 +74,10 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
     """
     length = round(seconds / step) + 1
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()
-    groups = _groups(runs, items, seconds, by_block)
+    if by_block is None:
+        by_block = len({run.drive for run in runs}) < FEW_DRIVES
+    block = max(BLOCK, 2.0 * seconds)
+    groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
     numbers = {id(run): number for number, run in enumerate(runs)}
     return Snippets(
         seconds,
@@ -84,15 +87,6 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
         np.array(groups, dtype=np.str_),
         tuple((numbers[id(one.run)], one.rows) for one in items),
     )
-
-
-def _groups(runs: Sequence[Run], items: Sequence[Snippet], seconds: float, by_block: bool | None) -> list[str]:
-    """What each snippet is judged with: its drive, or a block of it."""
-    if by_block is None:
-        by_block = len({run.drive for run in runs}) < FEW_DRIVES
-    block = max(BLOCK, 2.0 * seconds)
-    groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
-    return groups
 
 
 def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, with_sensor: bool = False) -> FloatArray:
@@ -197,7 +191,11 @@ def evaluate_parts(
     profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
 ) -> tuple[PartEvaluation, ...]:
     """Run the paper's four evaluations; (4) takes `sampled`, effects included. `sampled` of shape (n, m). [m]"""
-    coarse_real, fine_real = _real_parts(snippets)
+    # The paper's split of the measured snippets is made on whole runs, so that only a run's ends are ends.
+    split = {id(one.run): split_levels(one.run.rel_offset, PAPER_SETTINGS) for one in snippets.items}
+    coarse_real, fine_real = (
+        np.array([split[id(one.run)][part][one.rows] for one in snippets.items]) for part in range(2)
+    )
     coarse, fine = sample_parts(profile, snippets, seed)
     shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
     width = snippets.lane_width
@@ -208,19 +206,9 @@ def evaluate_parts(
         ("sampled", "sampled", sampled),
     )
     real = snippet_metrics(snippets.offset)
-    return tuple(_compared(number, *each, real) for number, each in enumerate(combinations, start=1))
-
-
-def _compared(number: int, coarse_from: str, fine_from: str, rows: FloatArray, real: FloatArray) -> PartEvaluation:
-    """Snippets [m], shape (n, m), put together from parts, beside the measured ones' metrics."""
-    artificial = snippet_metrics(rows)
-    return PartEvaluation(number, coarse_from, fine_from, real, artificial, metric_distances(real, artificial))
-
-
-def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:
-    """The paper's split of the measured snippets, made on whole runs so that only a run's ends are ends."""
-    runs = {id(one.run): one.run for one in snippets.items}
-    split = {key: split_levels(run.rel_offset, PAPER_SETTINGS) for key, run in runs.items()}
-    coarse = np.array([split[id(one.run)][0][one.rows] for one in snippets.items])
-    fine = np.array([split[id(one.run)][1][one.rows] for one in snippets.items])
-    return coarse, fine
+    evaluations = []
+    for number, (coarse_from, fine_from, rows) in enumerate(combinations, start=1):
+        artificial = snippet_metrics(rows)
+        distances = metric_distances(real, artificial)
+        evaluations.append(PartEvaluation(number, coarse_from, fine_from, real, artificial, distances))
+    return tuple(evaluations)

@@ -32,15 +32,20 @@ from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
-from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings, coarse_power, scaled_spectrum, shaped
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
+    FitSettings,
+    coarse_power,
+    fine_power,
+    scaled_spectrum,
+    shaped,
+)
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import autocovariance, fit_volatility, log_power, rounded
 from xosc_lateral.drivers.fitting.sensor.likelihood import KNOTS, interpolation
 from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
 from xosc_lateral.drivers.model.core.autoregressive.coarse import BORDER, COARSE_EVERY, FREQUENCIES
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
-from xosc_lateral.drivers.model.core.base import ModelKind
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ModelKind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Piecewise
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.validity import Band, Validity
@@ -108,15 +113,11 @@ class FastPart:
     """Fast movement of drivers, where every column of `effects` is at its reference."""
 
     density: Density
-    effects: tuple[ColumnEffect, ...]
-    """On the fine part."""
+    effects: tuple[ColumnEffect, ...]  # On the fine part.
     volatility: Volatility
-    highest: float
-    """Frequency up to which it is measured. [Hz]"""
-    source: str
-    """In words."""
-    speed: tuple[float, float] | None = None
-    """At which it was measured. [m/s]"""
+    highest: float  # Frequency up to which it is measured. [Hz]
+    source: str  # In words.
+    speed: tuple[float, float] | None = None  # At which it was measured. [m/s]
 
 
 def steering_gain(speed: FloatArray) -> FloatArray:
@@ -276,7 +277,8 @@ def density_of(profile: DriverProfile) -> Density:
 
     def at(hertz: FloatArray) -> FloatArray:
         slower = np.minimum(hertz, 0.5 / model.step)
-        power = coarse_power(model.coarse, slower * model.step) + _fine_power(model, slower)
+        knots = slower * model.step
+        power = coarse_power(model.coarse, knots) + fine_power(model.fine, knots)
         return np.asarray(2.0 * model.step * profile.lane_width**2 * power)
 
     return at
@@ -305,15 +307,15 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     hertz = FREQUENCIES / (COARSE_EVERY * model.step)
     coarse = scaled_spectrum(model.coarse, np.sqrt(_roll_off(hertz, corner)))
     at = np.linspace(0.0, 0.5 / model.step, FINE_SETTINGS.n_knots)
-    fine_power = _fine_power(model, at) * _roll_off(at, corner)
+    kept_power = fine_power(model.fine, at * model.step) * _roll_off(at, corner)
     if fast is not None:
         power = fast.density(np.maximum(at, at[1])) / (2.0 * model.step * profile.lane_width**2)
         risen = np.clip((at / corner - RISE_SHARES[0]) / (RISE_SHARES[1] - RISE_SHARES[0]), 0.0, 1.0)
         share = np.sin(0.5 * np.pi * risen) ** 2
-        lacking = power - fine_power - coarse_power(coarse, at * model.step)
-        fine_power = fine_power + share**2 * np.maximum(lacking, 0.0)
+        lacking = power - kept_power - coarse_power(coarse, at * model.step)
+        kept_power = kept_power + share**2 * np.maximum(lacking, 0.0)
     volatility = model.fine_volatility if fast is None or corner > BORDER else fast.volatility
-    fine = shaped(np.sqrt(fine_power / NOISE_VARIANCE), FINE_SETTINGS)
+    fine = shaped(np.sqrt(kept_power / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
     kept = [
         effect
@@ -326,12 +328,6 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
 def _roll_off(hertz: FloatArray, corner: float) -> FloatArray:
     """Share of a recording's power that is kept, shape of the frequencies. [-]"""
     return np.asarray(1.0 / (1.0 + (hertz / corner) ** ROLL_OFF_ORDER))
-
-
-def _fine_power(model: AutoregressiveModel, hertz: FloatArray) -> FloatArray:
-    """Of the fine part, shape of the frequencies; white noise of variance 1 has 1. [lane widths squared]"""
-    waves = np.exp(-2j * np.pi * np.outer(hertz * model.step, np.arange(len(model.kernel))))
-    return np.asarray(NOISE_VARIANCE * np.abs(waves @ model.kernel) ** 2)
 
 
 def _autoregressive(profile: DriverProfile) -> AutoregressiveModel:
@@ -370,8 +366,8 @@ def measured(runs: Sequence[Run], highest: float | None = None, source: str = ""
 
 
 def _range(parts: Sequence[FloatArray]) -> tuple[float, float]:
-    low, high = all_significant(np.quantile(np.concatenate(parts), (TAIL_SHARE, 1.0 - TAIL_SHARE)), 5)
-    return low, high
+    low, high = np.quantile(np.concatenate(parts), (TAIL_SHARE, 1.0 - TAIL_SHARE)).tolist()
+    return significant(low, 5), significant(high, 5)
 
 
 def in_bands(

@@ -103,19 +103,21 @@ def fit_context_effects(runs: Sequence[Run], *, neighbours: bool | None = None) 
 
 def without_effects(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[Run]:
     """Runs as they would be with every column at its reference."""
-    return [_at_reference(run, effects) for run in runs] if effects else list(runs)
-
-
-def _at_reference(run: Run, effects: Sequence[ColumnEffect]) -> Run:
-    strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
-    for effect in effects:
-        acting = effect.strength(STEP, run.context)
-        if acting is not None:
-            strength[effect.acts] += acting
-    moved = run.offset - strength[Acts.LOCATION]
-    level = float(moved.mean())
-    slow, fast = split_bands(moved - level, STEP)
-    return replace(run, offset=level + slow * np.exp(-strength[Acts.SPREAD]) + fast * np.exp(-strength[Acts.FINE]))
+    if not effects:
+        return list(runs)
+    freed = []
+    for run in runs:
+        strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
+        for effect in effects:
+            acting = effect.strength(STEP, run.context)
+            if acting is not None:
+                strength[effect.acts] += acting
+        moved = run.offset - strength[Acts.LOCATION]
+        level = float(moved.mean())
+        slow, fast = split_bands(moved - level, STEP)
+        offset = level + slow * np.exp(-strength[Acts.SPREAD]) + fast * np.exp(-strength[Acts.FINE])
+        freed.append(replace(run, offset=offset))
+    return freed
 
 
 def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:

@@ -10,7 +10,7 @@ they miss, and the result measured again with other seeds: those are the figures
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,13 +18,13 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
-from xosc_lateral.drivers.fitting.stated_figures import Asked, Preset
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.drivability import UNCOMFORTABLE_SHARE, strain
 from xosc_lateral.drivers.model.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.drivers.model.effects.base import FACTOR_LIMIT
+from xosc_lateral.drivers.model.plausibility import UNCOMFORTABLE_SHARE, strain
 from xosc_lateral.drivers.model.profile import DriverProfile
 
 TOLERANCE = 0.02
@@ -122,19 +122,18 @@ def _of_class(base: DriverProfile, vehicle: str | None) -> tuple[DriverProfile, 
     """The base with what it knows of trucks made its own, where that is asked."""
     if vehicle is None:
         return base, Adapted()
-    of_trucks = [effect for effect in base.effects if effect.columns == ("is_truck",)]
+    of_trucks = [
+        effect for effect in base.effects if isinstance(effect, ColumnEffect) and effect.columns == ("is_truck",)
+    ]
     if not of_trucks:
         raise DriverProfileError(f"{base.name} doesn't know how trucks differ: no effect of is_truck")
     changes = dict.fromkeys(Acts, 0.0)
     for effect in of_trucks:
-        assert isinstance(effect, ColumnEffect)
         strength = effect.strength(base.model.step, {"is_truck": np.ones(2)})
         changes[effect.acts] += 0.0 if strength is None else float(strength[-1])
     rest = tuple(effect for effect in base.effects if effect not in of_trucks)
-    spread, rate, fine = (float(np.exp(changes[acts])) for acts in (Acts.SPREAD, Acts.RATE, Acts.FINE))
-    return structs.replace(base, effects=rest), Adapted(
-        shift=changes[Acts.LOCATION], spread=spread, rate=rate, fine=fine
-    )
+    factors = {acts.value: float(np.exp(changes[acts])) for acts in (Acts.SPREAD, Acts.RATE, Acts.FINE)}
+    return structs.replace(base, effects=rest), Adapted(shift=changes[Acts.LOCATION], **factors)
 
 
 class _Parts(NamedTuple):
@@ -241,7 +240,6 @@ def _corrected(want: Asked, asked: Asked, reached: LaneKeeping) -> Asked:
 
 
 def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) -> None:
-    """Refuse what could not be driven, or is no lane keeping."""
     out = float((np.abs(drives) > 0.5 * profile.lane_width).mean())
     if out > UNCOMFORTABLE_SHARE:
         raise DriverProfileError(
@@ -252,7 +250,7 @@ def _check_drivable(drives: FloatArray, profile: DriverProfile, speed: float) ->
     if worst.excess > 1.0:  # in every second hour
         raise DriverProfileError(
             f"no car could drive it: lateral acceleration above {worst.seldom:.2f} m/s2 for 0.1 % of the time, at most "
-            f"{worst.largest:.2f} m/s2, jerk at most {worst.jerk:.1f} m/s3 (see `model.drivability`)"
+            f"{worst.largest:.2f} m/s2, jerk at most {worst.jerk:.1f} m/s3 (see `model.plausibility`)"
         )
 
 
@@ -289,3 +287,96 @@ def _described(
     known = base.metadata
     metadata = structs.replace(known, tags=(*known.tags, "derived"), vehicle=asked.vehicle or known.vehicle)
     return structs.replace(profile, provenance=provenance, metadata=metadata, sensor=None)
+
+
+# ---- what can be asked of a driver, and states of drivers that a source gives figures of ----
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Figures that a driver is to have; None: the base's."""
+
+    sdlp: float | None = None  # Standard deviation of lateral position, as the highway driving test has it. [m]
+    sdlp_change: float | None = None  # The same, as a difference from the base's. [m]
+    mean: float | None = None  # Mean offset, positive left. [m]
+    restlessness: float | None = None  # Standard deviation of lateral speed. [m/s]
+    memory: float | None = None  # After which a deviation is correlated with itself by 1/e. [s]
+    near_line: float | None = None  # Share of time with a side within 0.2 m of a marking, or beyond it. [-]
+    speed: float | None = None  # At which the figures hold. [m/s]
+    vehicle: str | None = None  # "truck": what the base knows of trucks.
+
+    def check(self) -> None:
+        """Refuse what no driver has."""
+        for name, unit in (("sdlp", " m"), ("restlessness", " m/s"), ("memory", " s"), ("near_line", "")):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise DriverProfileError(f"{name.replace('_', ' ')} of {value:g}{unit}: it is above 0")
+        if self.near_line is not None and self.near_line >= 1.0:
+            raise DriverProfileError(f"near line {self.near_line:g}: a share of the time is below 1")
+        if self.sdlp is not None and self.sdlp_change is not None:
+            raise DriverProfileError("an SDLP and a change of it: one of both")
+        if self.speed is not None and not MINIMUM_SPEED <= self.speed < 100.0:
+            raise DriverProfileError(
+                f"speed of {self.speed:g} m/s: profiles say nothing below {MINIMUM_SPEED:.1f} m/s, or from 100 m/s on"
+            )
+        if self.vehicle not in (None, "truck"):
+            raise DriverProfileError(f"class {self.vehicle!r}: expected truck")
+        if self.mean is not None and not np.isfinite(self.mean):
+            raise DriverProfileError(f"mean of {self.mean:g} m")
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Those that are stated, by name."""
+        values = {name: getattr(self, name) for name in ("sdlp", "mean", "restlessness", "memory", "near_line")}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def size_is_given(self) -> bool:
+        """Whether the size of the movement follows from other figures than the time near a marking."""
+        return self.sdlp is not None or (self.restlessness is not None and self.memory is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A state of a driver that a source gives figures of."""
+
+    name: str
+    what: str
+    asked: Asked
+    source: str
+    doi: str
+
+
+PRESETS = (
+    Preset(
+        "alcohol-0.5",
+        "0.5 g/l of alcohol in the blood: SDLP 2.5 cm larger (95 % interval 2.0 to 2.9), 182 drivers, on the road",
+        Asked(sdlp_change=0.025),
+        "S. Jongen et al., A pooled analysis of on-the-road highway driving studies in actual traffic measuring "
+        "standard deviation of lateral position while driving at a blood alcohol concentration of 0.5 g/L, "
+        "Psychopharmacology 234, 2017, pp. 837-844",
+        "10.1007/s00213-016-4519-z",
+    ),
+    Preset(
+        "drowsy",
+        "after a night without sleep: SDLP 3.1 cm larger, 24 drivers, on the road",
+        Asked(sdlp_change=0.031),
+        "S. Jongen et al., Sensitivity and validity of psychometric tests for assessing driving impairment: effects of "
+        "sleep deprivation, PLoS ONE 10(2), 2015, e0117045",
+        "10.1371/journal.pone.0117045",
+    ),
+    Preset(
+        "truck",
+        "what the base's own recording says of trucks",
+        Asked(vehicle="truck"),
+        "DLR Highway Traffic v1.1.0, where the base is a shipped population",
+        "10.5281/zenodo.14012005",
+    ),
+)
+"""Only what a source states; each is a difference from the base, whose figures are those of the sober and rested."""
+
+
+def preset_called(name: str) -> Preset:
+    """A preset by name."""
+    for preset in PRESETS:
+        if preset.name == name:
+            return preset
+    raise DriverProfileError(f"no preset {name!r}; there are {', '.join(preset.name for preset in PRESETS)}")

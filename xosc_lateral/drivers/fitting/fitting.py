@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace as with_fields
 
 import numpy as np
@@ -16,7 +16,7 @@ from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
-from xosc_lateral.drivers.fitting.bands import in_bands, split_by_band
+from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, in_bands, split_by_band
 from xosc_lateral.drivers.fitting.context_effects import (
     LEAST_DRIVES,
     beside_effects,
@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.context_effects import (
 )
 from xosc_lateral.drivers.fitting.sensor.periodogram import PASSED_FREQUENCY, WINDOWS
 from xosc_lateral.drivers.fitting.sensor.separation import separate
-from xosc_lateral.drivers.model.core.base import CoreModel, ModelKind
+from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.core.registry import model_named
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -42,6 +42,7 @@ def fit_profile(
     sensor_noise: float | None = None,
     neighbours: bool | None = None,
     prior: DriverProfile | None = None,
+    stand_in: Callable[[], DriverProfile] | None = None,
 ) -> DriverProfile:
     """Cut drives into runs, separate driver and sensor, and fit a profile.
 
@@ -64,17 +65,20 @@ def fit_profile(
     prior : DriverProfile, optional
         Where its movement comes from above the band that the drives show (`Drive.valid_below`), if no other drives show
         it: without, there is none above.
+    stand_in : callable, optional
+        Gives the prior, of a model of ours, where the drives state a band that ends below `KEEPING_BAND`.
     """
     slow, fast = split_by_band(drives)
     runs = all_runs(slow, rules)
-    if (
-        model_named(model).model.kind == ModelKind.TWO_LEVEL
-    ):  # to the letter: the paper takes offsets as they were measured
+    if model_named(model).model.kind == ModelKind.TWO_LEVEL:  # the paper takes offsets as they were measured
         if neighbours:
             raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
         if fast or prior is not None:
             raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted to one recording alone")
         return in_bands(fit_runs(runs, name=name, model=model, provenance=provenance), runs)
+    is_partial = not fast and any((drive.valid_below or np.inf) < KEEPING_BAND for drive in slow)
+    if stand_in is not None and is_partial:
+        prior = stand_in()
     cleaned, sensor = driver_runs(runs, slow, sensor_noise=sensor_noise)
     known = provenance or Provenance()
     known = replace(known, fit={**known.fit, **_marking_notes(slow)})
@@ -123,27 +127,19 @@ def fit_runs(
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
 ) -> DriverProfile:
-    """Fit a profile to runs that are cut already."""
+    """Fit a profile to runs that are cut already; its provenance says on what and how."""
     core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
-    return DriverProfile(
-        name=name,
-        model=core,
-        lane_width=float(np.median(np.concatenate([run.lane_width for run in runs]))),
-        provenance=_fitted_on(runs, core, provenance or Provenance()),
-    )
-
-
-def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Provenance:
-    """What is known, with what it was fitted on and how."""
-    seconds = sum(len(run) for run in runs) * core.step
-    return replace(
+    known, step = provenance or Provenance(), core.step
+    known = replace(
         known,
-        hours=round(seconds / 3600.0, 4),
+        hours=round(sum(map(len, runs)) * step / 3600.0, 4),
         drives=len({run.drive for run in runs}),
         runs=len(runs),
-        fit={**known.fit, "model": core.kind, "step_s": core.step, "sizes": sizes_of_runs(runs, core.step).to_dict()},
+        fit={**known.fit, "model": core.kind, "step_s": step, "sizes": sizes_of_runs(runs, step).to_dict()},
         package_version=__version__,
     )
+    width = float(np.median(np.concatenate([run.lane_width for run in runs])))
+    return DriverProfile(name=name, model=core, lane_width=width, provenance=known)
 
 
 # ---- The driver's part of measured runs ----
@@ -166,12 +162,12 @@ def driver_runs(
     if highest < LEAST_BAND:
         variance = float(np.concatenate([run.offset for run in runs]).var())
         return list(runs), SensorModel(0.0, driver_variance=significant(variance, 7), driver_share=(1.0, 1.0))
-    rows, rate = rows_of(runs, drives)
+    rows, durations, rate = rows_of(runs, drives)
     separated = separate(
         [run.offset for run in runs],
         STEP,
         rows=rows,
-        durations=durations_of(runs, drives),
+        durations=durations,
         rate=rate,
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
@@ -181,19 +177,17 @@ def driver_runs(
     return [with_fields(run, offset=separated.driver_part(run.offset, STEP)) for run in runs], separated.sensor
 
 
-def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
-    """Offsets of the runs as recorded [m], and rows per second [Hz]; None where not all drives are there."""
+def rows_of(
+    runs: Sequence[Run], drives: Sequence[Drive]
+) -> tuple[list[FloatArray] | None, list[FloatArray] | None, float | None]:
+    """Offsets of the runs as recorded [m], how long each row stands for, up to the middles between it and its
+    neighbours [s], and rows per second [Hz]; None where not all drives are there."""
     cut = _recorded(runs, drives)
     if cut is None:
-        return None, None
-    steps = np.concatenate([np.diff(drive.time[rows]) for drive, rows in cut])
-    return [drive.offset[rows] for drive, rows in cut], 1.0 / float(np.median(steps))
-
-
-def durations_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:
-    """How long each row of the runs stands for, up to the middles between it and its neighbours [s]; None as above."""
-    cut = _recorded(runs, drives)
-    return None if cut is None else [np.gradient(drive.time[rows]) for drive, rows in cut]
+        return None, None, None
+    times = [drive.time[rows] for drive, rows in cut]
+    rate = 1.0 / float(np.median(np.concatenate([np.diff(time) for time in times])))
+    return [drive.offset[rows] for drive, rows in cut], [np.gradient(time) for time in times], rate
 
 
 def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:

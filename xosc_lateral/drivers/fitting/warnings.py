@@ -9,7 +9,7 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.bands import COMPARED_FREQUENCIES, KEEPING_BAND, SPLIT_AT, density_of, fast_part_of
 from xosc_lateral.drivers.fitting.sensor.periodogram import COARSE_STEP_RATIO, uniform_variance
 from xosc_lateral.drivers.model.core.base import ModelKind
-from xosc_lateral.drivers.model.drivability import ACCELERATION_LIMIT, JERK_LIMIT, comfort, strain
+from xosc_lateral.drivers.model.plausibility import ACCELERATION_LIMIT, JERK_LIMIT, comfort, strain
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 

@@ -20,7 +20,7 @@ from xosc_lateral.drivers.loop.columns import Column
 from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import ColumnEffect, Product
-from xosc_lateral.drivers.model.effects.product import Form
+from xosc_lateral.drivers.model.effects.shapes import Form
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
 Priced = tuple[ColumnEffect, float]  # An effect, and what its family and a finer choice within it take from its score.

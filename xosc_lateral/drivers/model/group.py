@@ -18,9 +18,9 @@ from xosc_lateral.drivers.model.effects import Acts, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import Response, ResponseState
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
-from xosc_lateral.drivers.model.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
 
 BLOCK = 64
 """Model steps drawn at once for a driver. [-]"""

@@ -100,21 +100,15 @@ def recur(past: FloatArray, noise: FloatArray, coefficients: FloatArray) -> Floa
     """
     order, paths = len(coefficients), noise.shape[1] if noise.ndim == 2 else 1
     if paths >= WORTH_VECTORISING and not worth_compiling(noise.size):
-        return _recur_side_by_side(past, noise, coefficients)
+        series = np.concatenate([past, noise])  # the same sums in the same order, one step of all paths after the other
+        for t in range(order, len(series)):
+            for k in range(order):
+                series[t] += coefficients[k] * series[t - 1 - k]
+        return series
     series = np.empty((order + len(noise)) * paths)
     series[: order * paths] = past.ravel()
     _recur(noise.size * max(1, order // 4), (noise.ravel(), coefficients, order, paths), (series,))
     return series.reshape(-1, *noise.shape[1:])
-
-
-def _recur_side_by_side(past: FloatArray, noise: FloatArray, coefficients: FloatArray) -> FloatArray:
-    """The same sums in the same order, one step of all paths after the other."""
-    order = len(coefficients)
-    series = np.concatenate([past, noise])
-    for t in range(order, len(series)):
-        for k in range(order):
-            series[t] += coefficients[k] * series[t - 1 - k]
-    return series
 
 
 def _convolve_body(values, kernel, result):  # type: ignore[no-untyped-def]

@@ -1,8 +1,16 @@
-"""What no driver does and no road has: found before it gets into an output. Numbers and reasons are in `limits`."""
+"""What no driver does and no road has: found before it gets into an output. Numbers and reasons are in `limits`.
+
+References
+----------
+.. [1] AASHTO, "A Policy on Geometric Design of Highways and Streets", 2018, chapter 3: limiting values of the side
+   friction factor, from 0.32 at 15 mph to 0.08 at 80 mph.
+.. [2] UN Regulation No. 79, revision 4, paragraph 5.6.2.1.3: lateral acceleration and jerk of lane keeping, M1.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +19,11 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.base.segment import Segment
+from xosc_lateral.drivers.drives.filters import filtered
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
+
 
 MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
@@ -100,3 +110,106 @@ def check_profile(profile: DriverProfile) -> None:
     with np.errstate(all="ignore"):
         offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL, TRIAL_SPEED)), 0)
     check_offsets(offset, width, subject, time)
+
+
+# ---- what can be driven: bounds on the lateral acceleration and jerk of lane keeping, by speed ----
+# Comfort: the side friction at which drivers begin to feel discomfort, by speed [1]_; nobody keeps a lane beyond it for
+# more than an instant. Limit: what lane keeping by a machine is allowed in Europe, 3 m/s2 and, over half a second,
+# 5 m/s3 [2]_ (the same figures as for lane keeping assistance in ISO 11270:2014). Real motorway traffic stays far below
+# either: 0.3 m/s2 in 99.9 % of the time (docs/real_data.md).
+GRAVITY = 9.80665
+MPH = 0.44704
+_SPEED = MPH * np.arange(15.0, 81.0, 5.0)
+_FRICTION = np.array([0.32, 0.27, 0.23, 0.20, 0.18, 0.16, 0.15, 0.14, 0.13, 0.12, 0.11, 0.10, 0.09, 0.08])
+
+ACCELERATION_LIMIT, JERK_LIMIT = 3.0, 5.0
+"""[m/s2], [m/s3]"""
+
+JERK_WINDOW = 0.5
+"""Jerk is averaged over this. [s]"""
+
+UNCOMFORTABLE_SHARE = 1e-3
+"""Share of the time that lane keeping may be uncomfortable. [-]"""
+
+MINIMUM_KERNEL_WIDTH, MAXIMUM_KERNEL_WIDTH = 0.1, 3.0
+"""Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Strain:
+    """How hard a path is to drive."""
+
+    seldom: float  # Lateral acceleration exceeded in 0.1 % of the time. [m/s2]
+    largest: float  # Largest acceleration. [m/s2]
+    jerk: float  # Largest over half a second. [m/s3]
+    excess: float  # Largest of these over their bounds: above 1 it could not be driven. [-]
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """That a path was smoothed, and why: strain before and after, width of the kernel [s]."""
+
+    before: Strain
+    after: Strain
+    width: float
+
+    def __str__(self) -> str:
+        return (
+            f"sampled movement could not be driven (lateral acceleration above {self.before.seldom:.2f} m/s2 for 0.1 % "
+            f"of the time, at most {self.before.largest:.2f} m/s2, jerk at most {self.before.jerk:.1f} m/s3): smoothed "
+            f"over {self.width:.1f} s, now {self.after.seldom:.2f} m/s2, {self.after.largest:.2f} m/s2 and "
+            f"{self.after.jerk:.1f} m/s3"
+        )
+
+
+def comfort(speed: FloatArray) -> FloatArray:
+    """Lateral acceleration at which drivers begin to feel discomfort. [m/s2] Shape as `speed` [m/s]."""
+    return np.asarray(GRAVITY * np.interp(np.abs(speed), _SPEED, _FRICTION))
+
+
+def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
+    """Strain of a path, from its offsets at an even step and the speed there.
+
+    `offset` [m] and `speed` [m/s] of shape (n,); `step` in [s].
+    """
+    if len(offset) < 4:
+        return Strain(0.0, 0.0, 0.0, 0.0)
+    signed = np.diff(offset, 2) / step**2
+    acceleration, span = np.abs(signed), max(1, round(JERK_WINDOW / step))
+    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
+    hardest = float(jerk.max())
+    bound = comfort(speed)[1:-1]
+    largest = float(acceleration.max())
+    seldom, uncomfortable = (_seldom_exceeded(values) for values in (acceleration, acceleration / bound))
+    return Strain(seldom, largest, hardest, max(uncomfortable, largest / ACCELERATION_LIMIT, hardest / JERK_LIMIT))
+
+
+def _seldom_exceeded(values: FloatArray) -> float:
+    """What n >= 2 values exceed in `UNCOMFORTABLE_SHARE` of the time: `np.quantile`, which would load `numpy.ma`."""
+    at = (len(values) - 1) * (1.0 - UNCOMFORTABLE_SHARE)
+    low, high = np.partition(values, (int(at), int(at) + 1))[int(at) : int(at) + 2].tolist()
+    share: float = at - int(at)
+    return low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share)  # type: ignore[no-any-return]
+
+
+def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatArray, Bound | None]:
+    """The path, smoothed as little as it takes to be drivable; with the reason where it had to be.
+
+    `offset` [m] and `speed` [m/s] of shape (n,); `step` in [s].
+    """
+    before = strain(offset, step, speed)
+    if before.excess <= 1.0:
+        return offset, None
+    width, smooth, after = MINIMUM_KERNEL_WIDTH, offset, before
+    while after.excess > 1.0 and width <= MAXIMUM_KERNEL_WIDTH:
+        smooth = _smoothed(offset, width / step)
+        after = strain(smooth, step, speed)
+        width *= 1.3
+    return smooth, Bound(before, after, width / 1.3)
+
+
+def _smoothed(values: FloatArray, width: float) -> FloatArray:
+    """Gaussian smoothing, continued point-symmetrically past both ends, which stay where they are."""
+    half = min(int(np.ceil(4.0 * width)), len(values) - 1)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
+    return filtered(values, kernel / kernel.sum())

@@ -86,18 +86,13 @@ class Provenance(Record, frozen=True):
 class Metadata(Record, frozen=True):
     """What a profile is of, to be searched by; all of it is optional."""
 
-    version: str = ""
-    """Of the profile itself, as its owners count: "2", "1.3"."""
+    version: str = ""  # Of the profile itself, as its owners count: "2", "1.3".
     driver: str = ""
     vehicle: str = ""
-    road: str = ""
-    """Whom and what was measured, and where: "professional", "truck", "motorway"."""
-    country: str = ""
-    """ISO 3166-1 alpha-2: "DE"."""
-    date: str = ""
-    """When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01"."""
-    licence: str = ""
-    """Of the profile."""
+    road: str = ""  # Whom and what was measured, and where: "professional", "truck", "motorway".
+    country: str = ""  # ISO 3166-1 alpha-2: "DE".
+    date: str = ""  # When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
+    licence: str = ""  # Of the profile.
     tags: tuple[str, ...] = ()
 
 
@@ -111,43 +106,21 @@ MAX_LANE_WIDTH = 10.0
 
 
 class DriverProfile(Record, frozen=True):
-    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width.
-
-    Parameters
-    ----------
-    name : str
-        Its id: the same in the file, in the file's name and wherever it is looked up.
-    model : CoreModel
-        Base movement.
-    effects : tuple of Effect
-        In the order in which they were found.
-    lane_width : float
-        Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in.
-        Above 0, at most `MAX_LANE_WIDTH`. [m]
-    provenance : Provenance
-    metadata : Metadata
-    sensor : SensorModel, optional
-        What the sensor added to the drives it was fitted on, where that is known.
-    left_hand : bool
-        Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
-    beside : mapping of str to Beside
-        By side, "left" and "right": whether its answer to neighbours there is known, and how.
-    validity : Validity
-        Where it is known to hold.
-    """
+    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width."""
 
     later = ("left_hand", "beside", "validity")
 
-    name: str = field(name="id")
-    model: CoreModel
-    effects: tuple[Effect, ...] = ()
+    name: str = field(name="id")  # The same in the file, in the file's name and wherever it is looked up.
+    model: CoreModel  # Base movement.
+    effects: tuple[Effect, ...] = ()  # In the order in which they were found.
+    # Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in. [m]
     lane_width: float = 3.75
     provenance: Provenance = field(default_factory=Provenance)
     metadata: Metadata = field(default_factory=Metadata)
-    sensor: SensorModel | None = None
-    left_hand: bool = False
-    beside: Mapping[str, Beside] = field(default_factory=dict)
-    validity: Validity = Validity()
+    sensor: SensorModel | None = None  # What it added to the drives that were fitted, where that is known.
+    left_hand: bool = False  # Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
+    beside: Mapping[str, Beside] = field(default_factory=dict)  # Whether its response on a side is known, and how.
+    validity: Validity = Validity()  # Where it is known to hold.
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -237,7 +210,13 @@ class DriverProfile(Record, frozen=True):
         Raises `DriverProfileError` if it is no profile, of another version, or contradicts itself; names the field and
         where it stands.
         """
-        present = _checked(values)
+        if not isinstance(values, Mapping) or values.get("format") != FORMAT:
+            raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+        version = values.get("version")
+        if version != VERSION or isinstance(version, bool):
+            cure = ": update the package" if isinstance(version, int) and version > VERSION else ""
+            raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
+        present = {name: value for name, value in values.items() if name not in ("format", "version")}
         effects = present.get("effects")
         effects = effects if isinstance(effects, list) else ()
         kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
@@ -245,18 +224,6 @@ class DriverProfile(Record, frozen=True):
         kind = model.get("kind") if isinstance(model, Mapping) else None
         read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
         return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
-
-
-def _checked(values: object) -> dict[str, Any]:
-    """A profile file's values without format and version; refused if it is none of ours, or of another version."""
-    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
-        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
-    version = values.get("version")
-    if version != VERSION or isinstance(version, bool):
-        newer = isinstance(version, int) and version > VERSION
-        cure = ": update the package" if newer else ""
-        raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
-    return {name: value for name, value in values.items() if name not in ("format", "version")}
 
 
 @lru_cache(maxsize=16)

@@ -22,8 +22,8 @@ T = TypeVar("T")
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters: set once, checked in `__post_init__`; `msgspec.structs.replace` makes a changed copy."""
 
+    # Fields that came later: files are without them where they have their defaults, as they were before.
     later: ClassVar[tuple[str, ...]] = ()
-    """Fields that came later: files are without them where they have their defaults, as they were before."""
 
     def __deepcopy__(self, memo: object) -> Self:
         return self
@@ -80,10 +80,6 @@ def schema_hook(kind: type) -> dict[str, Any]:
     raise NotImplementedError(kind)
 
 
-def _dtype(kind: type) -> type[np.generic]:
-    return get_args(get_args(kind)[1])[0]  # type: ignore[no-any-return]
-
-
 def _encoded(value: object) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist() if value.size or value.ndim == 1 else {"shape": list(value.shape)}
@@ -96,9 +92,14 @@ def _encoded(value: object) -> Any:
 
 def _decoded(kind: type, value: Any) -> Any:
     if get_origin(kind) is np.ndarray:
+        wanted: type[np.generic] = get_args(get_args(kind)[1])[0]
         if isinstance(value, dict):  # no values: lists can't say how many there are none of
-            return _empty(value, _dtype(kind))
-        array, wanted = np.array(value), _dtype(kind)
+            shape = value.get("shape")
+            known = isinstance(shape, list) and 0 in shape and all(isinstance(n, int) for n in shape)
+            if len(value) != 1 or not known:
+                raise ValueError(f"expected a list of numbers, got {value!r}")
+            return np.empty(shape, dtype=wanted)
+        array = np.array(value)
         if array.size and not np.can_cast(array.dtype, wanted, "same_kind"):
             raise ValueError("expected numbers")  # of texts, numpy would make some, and of 1.5 a whole number
         return array.astype(wanted)
@@ -107,13 +108,6 @@ def _decoded(kind: type, value: Any) -> Any:
         generator.bit_generator.state = value
         return generator
     raise NotImplementedError(kind)
-
-
-def _empty(value: Any, dtype: type[np.generic]) -> Any:
-    shape = value.get("shape")
-    if len(value) != 1 or not isinstance(shape, list) or 0 not in shape or not all(isinstance(n, int) for n in shape):
-        raise ValueError(f"expected a list of numbers, got {value!r}")
-    return np.empty(shape, dtype=dtype)
 
 
 def _listed(value: Any) -> Any:

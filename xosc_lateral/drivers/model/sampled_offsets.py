@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, CutRules, all_runs, cut_runs, whole_run
+from xosc_lateral.drivers.drives.cuts import CutRules, all_runs, cut_runs, whole_run
 from xosc_lateral.drivers.drives.drive import Drive, Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import check_offsets
@@ -44,8 +44,7 @@ class SampledOffsets:
     offset: FloatArray
     offset_real: FloatArray | None
     lane_width: FloatArray
-    speed: FloatArray
-    """NaN where it is not known. [m/s]"""
+    speed: FloatArray  # NaN where it is not known. [m/s]
 
 
 def sample_like(
@@ -53,7 +52,6 @@ def sample_like(
     drives: Sequence[Drive],
     seconds: float,
     seed: int,
-    rules: CutRules = PAPER_RULES,
     *,
     with_sensor: bool = False,
 ) -> Iterator[SampledOffsets]:
@@ -61,7 +59,7 @@ def sample_like(
     sensor = known_sensor(profile) if with_sensor else None
     numbers = {drive.name: number for number, drive in enumerate(drives)}
     root = np.random.SeedSequence(seed)
-    for snippet in cut_snippets(all_runs(drives, rules), seconds):
+    for snippet in cut_snippets(all_runs(drives), seconds):
         name, seed_of_snippet = snippet.run.drive, child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
         offset = recorded_offsets(profile, segment, seed_of_snippet, sensor, float(snippet.offset[0]))
@@ -70,12 +68,7 @@ def sample_like(
 
 
 def sample_context(
-    profile: DriverProfile,
-    drives: Sequence[Drive],
-    seed: int,
-    rules: CutRules = WHERE_LANES_CHANGE,
-    *,
-    with_sensor: bool = False,
+    profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
 ) -> Iterator[SampledOffsets]:
     """One free run per measured drive, under its context from its first row to its last.
 
@@ -88,7 +81,7 @@ def sample_context(
         offset = recorded_offsets(profile, segment, child(root, number), sensor)
         _check(offset, segment, profile, drive.name)
         width, speed = _driven(segment)
-        for run in cut_runs(drive, rules):
+        for run in cut_runs(drive, WHERE_LANES_CHANGE):
             first = round(float(run.time[0] - segment.time[0]) / profile.model.step)
             rows = slice(first, first + len(run))
             yield SampledOffsets(drive.name, run.index, run.time, offset[rows], None, width[rows], speed[rows])

@@ -1,20 +1,28 @@
-"""Offsets for segments: a driver's drive, sampled segment after segment under what is known about each."""
+"""Offsets of one driver on one drive: what chance and the effects make of the core model's movement, block by block.
+
+This is the one place where offsets come from. A batch is one long block, a stream many short ones; the numbers are the
+same however a drive is cut into blocks. A drive is sampled segment after segment under what is known about each.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from typing import Self
+from typing import Any, NamedTuple, Self
 
+import msgspec
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms
+from xosc_lateral.drivers.model.core.base import CoreStream, Start
+from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.drivers.model.effects.base import step_of
+from xosc_lateral.drivers.model.effects.response import ResponseState
 from xosc_lateral.drivers.model.linear_filters import prepare
-from xosc_lateral.drivers.model.process import DriveProcess, combine
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.records import read_as
+from xosc_lateral.drivers.model.seeds import DriveSeed, child, generator
 
 Responses = Sequence[FloatArray | None]
 
@@ -29,13 +37,8 @@ class OffsetSampler:
     """One driver on one drive, sampled segment after segment.
 
     The state goes on from segment to segment (through a lane change, say) and from call to call: a segment cut in two
-    gives the same offsets as the whole, if both pieces carry the context around them (`Segment.before`, `after`).
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : int or numpy.random.SeedSequence
-        Same profile, seed and segments: same offsets, bit by bit.
+    gives the same offsets as the whole, if both pieces carry the context around them (`Segment.before`, `after`). Same
+    profile, seed and segments: same offsets, bit by bit.
     """
 
     def __init__(self, profile: DriverProfile, seed: int | np.random.SeedSequence) -> None:
@@ -46,19 +49,15 @@ class OffsetSampler:
     def sample(self, segment: Segment, *, start: float | None = None, responses: Responses | None = None) -> FloatArray:
         """Next offsets from the lane centre, positive to the LEFT of travel, one per row inside the segment. [m]
 
-        Raises `ValueError` if the segment has another step or lies before the last one, or `start` is given in the
-        middle of a drive.
-
-        Parameters
-        ----------
-        segment : Segment
-            At the model's step (5 Hz), not earlier than the last one.
-        start : float, optional
-            Offset at the first row [m]; at the start of a drive only. Without it the drive starts as chance has it.
-        responses : sequence of array or None, optional
-            What `responses_to` gave for this profile and segment, where that was asked before.
+        Raises `ValueError` if the segment has another step or lies before the last one, or `start` [m] is given in the
+        middle of a drive; without it a drive starts as chance has it. `responses`: what `responses_to` gave for this
+        profile and segment, where that was asked before.
         """
-        _check_step(segment, self.profile.model.step)
+        if len(segment) > 1:
+            step, steps = self.profile.model.step, np.diff(segment.time)
+            least, most = float(steps.min()), float(steps.max())
+            if not (1.0 - STEP_TOLERANCE) * step <= least <= most <= (1.0 + STEP_TOLERANCE) * step:
+                raise ValueError(f"segment with steps of {least:.4g} to {most:.4g} s, the model needs {step:g} s")
         width = segment.lane_width[segment.inside]
         n = len(width)
         if not n:
@@ -98,11 +97,8 @@ class OffsetSampler:
 def responses_to(segment: Segment, profile: DriverProfile) -> Responses:
     """What every driver of a profile responds to in the same way on a segment; drivers differ in how strongly.
 
-    Returns
-    -------
-    tuple of array or None
-        Per effect of columns, in the profile's order, what `ColumnEffect.response` gives for the rows inside, shape
-        (n, k); None where a column is not known.
+    Per effect of columns, in the profile's order, what `ColumnEffect.response` gives for the rows inside, shape (n, k);
+    None where a column is not known.
     """
     columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
     if not columned:
@@ -124,10 +120,231 @@ def sample_offsets(
     return OffsetSampler(profile, seed).sample(segment, start=start)
 
 
-def _check_step(segment: Segment, step: float) -> None:
-    if len(segment) < 2:
-        return
-    steps = np.diff(segment.time)
-    least, most = float(steps.min()), float(steps.max())
-    if not (1.0 - STEP_TOLERANCE) * step <= least <= most <= (1.0 + STEP_TOLERANCE) * step:
-        raise ValueError(f"segment with steps of {least:.4g} to {most:.4g} s, the model needs {step:g} s")
+# ---- the drive that is sampled from ----
+class DriveState(msgspec.Struct, kw_only=True):
+    """Where a drive is."""
+
+    begun_at: float | None = None  # Time of row 0 in the drive's clock; None before it is known. [s]
+    core: Any = None  # `CoreModel.State`; None before the first offset.
+    hidden: list[Any]  # `HiddenEffect.State` of each.
+    # `EffectTerms.parts` of all hidden effects at rows `first` to `drawn`, which may still be asked for.
+    terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * len(EffectTerms().parts))
+    first: int = 0
+    drawn: int = 0
+    coarse: FloatArray  # Core movement drawn ahead, as is `fine`, shape (k,). [lane widths]
+    fine: FloatArray
+
+
+class Movement(NamedTuple):
+    """What is random of offsets, before effects act: the mean that the coarse part moves about, both parts. [-]"""
+
+    mean: FloatArray | float
+    coarse: FloatArray
+    fine: FloatArray
+
+
+def offsets_of(profile: DriverProfile, movement: Movement, terms: EffectTerms, width: FloatArray) -> FloatArray:
+    """Offsets, by the formula of `EffectTerms`; rows of one drive, or one row of many drives, shape (n,) each. [m]"""
+    mean, coarse, fine = movement
+    by_lane, by_hand = profile.scales(width)
+    moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
+    noise = fine if terms.fine is None else terms.fine * fine
+    offset = (moved + noise) * by_lane if by_lane is by_hand else moved * by_lane + noise * by_hand
+    return np.asarray(offset if terms.location is None else offset + terms.location)
+
+
+class DriveProcess:
+    """One drive; what is random is drawn `ahead` by so many rows, to be quick with blocks of a single row."""
+
+    def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
+        self._profile, self._model, self._seed = profile, profile.model, seed
+        self._ahead = self._core_ahead = ahead
+        for effect in profile.effects:
+            if not isinstance(effect, HiddenEffect | ColumnEffect):
+                raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
+        self.hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
+        columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
+        self.columned = tuple(
+            effect.of_one_driver(generator(seed, DriveSeed.SLOPES, index)) if any(effect.between_drivers) else effect
+            for index, effect in enumerate(columned)
+        )
+        """The effects of columns, with this driver's own coefficients; their terms are given from outside."""
+        self.state = DriveState(
+            hidden=[
+                effect.begin(generator(seed, DriveSeed.HIDDEN, index), profile.model.step)
+                for index, effect in enumerate(self.hidden)
+            ],
+            coarse=np.empty(0),
+            fine=np.empty(0),
+        )
+        self._core: CoreStream | None = None
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether offsets were taken."""
+        return self._core is not None
+
+    def begin_at(self, time: float) -> None:
+        """Time of row 0 in the drive's clock; once. [s]"""
+        if self.state.begun_at is None:
+            self.state.begun_at = time
+
+    def draw_nothing_ahead(self) -> None:
+        """An effect on the rate of mean reversion is known to come: what it acts on must not be drawn yet."""
+        self._core_ahead = 0
+
+    def hidden_terms(self, time: FloatArray) -> EffectTerms:
+        """What the hidden effects do together at times of the drive, which begins at the first one ever asked for.
+
+        `time` [s] of shape (n,), n >= 1, at about the model's step, none earlier than the last of an earlier call.
+        """
+        if not self.hidden:
+            return EffectTerms()
+        self.begin_at(float(time[0]))
+        rows = np.round((time - (self.state.begun_at or 0.0)) / self._model.step).astype(np.int64)
+        return self.hidden_terms_at(rows)
+
+    def hidden_terms_at(self, rows: IntArray) -> EffectTerms:
+        """The same at rows, counted in model steps from the drive's start; shape (n,), n >= 1."""
+        if not self.hidden:
+            return EffectTerms()
+        state, low, high = self.state, int(rows[0]), int(rows[-1]) + 1
+        if low < state.first:
+            raise ValueError(f"row {low} of a drive that has gone on to row {state.first}")
+        if high > state.drawn:
+            self._draw_hidden(max(high, state.drawn + self._ahead))
+        terms = EffectTerms(*state.terms)
+        if high - low == len(rows):
+            taken = terms.rows(slice(low - state.first, high - state.first))
+        else:  # a segment whose step is a little off the model's
+            taken = terms.rows(rows - state.first)
+        done = high - 1 - state.first  # the last row stays: the next segment may begin with it
+        if done >= max(self._ahead, 1):
+            state.terms = [None if values is None else values[done:] for values in state.terms]
+            state.first += done
+        return taken
+
+    def _draw_hidden(self, until: int) -> None:
+        state, step = self.state, self._model.step
+        assert state.begun_at is not None
+        time = state.begun_at + step * np.arange(state.drawn, until, dtype=np.float64)
+        new = combine([effect.advance(own, time, step) for effect, own in zip(self.hidden, state.hidden, strict=True)])
+        state.terms = [
+            more if kept is None or more is None else np.concatenate([kept, more])
+            for kept, more in zip(state.terms, new.parts, strict=True)
+        ]
+        state.drawn = until
+
+    def take(self, terms: EffectTerms, width: FloatArray, start: float | None = None) -> FloatArray:
+        """Next offsets, shape (n,), by what all effects do together there and the lane's width, shape (n,). [m]
+
+        Raises `ValueError` if the first offset `start` [m] is given in the middle of a drive.
+        """
+        if self._core is None:
+            self._core = self._model.stream(
+                child(self._seed, DriveSeed.CORE), _start(self._profile, start, width, terms)
+            )
+            self.state.core = self._core.state
+        elif start is not None:
+            raise ValueError("a drive that continues from a state has no start")
+        return offsets_of(self._profile, self.movement(len(width), terms.rate), terms, width)
+
+    def movement(self, n: int, rate: FloatArray | None = None) -> Movement:
+        """Next movement, before effects act: what `take` makes offsets of; `rate` [-] of shape (n,).
+
+        A drive that has not begun begins as chance has it.
+        """
+        if self._core is None:
+            self._core = self._model.stream(child(self._seed, DriveSeed.CORE), None)
+            self.state.core = self._core.state
+        return Movement(self._core.mean, *self._take_core(self._core, n, rate))
+
+    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Next rows of the core movement."""
+        state = self.state
+        if rate is not None or not (self._core_ahead or len(state.coarse)):
+            return core.take(n, rate)
+        missing = n - len(state.coarse)
+        if missing > 0:
+            coarse, fine = core.take(max(missing, self._core_ahead))
+            state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
+        taken = state.coarse[:n], state.fine[:n]
+        state.coarse, state.fine = state.coarse[n:], state.fine[n:]
+        return taken
+
+    def restore(self, values: Any, where: str) -> None:
+        """Go on from a state as plain JSON values.
+
+        Raises `DriverProfileError` if it is none, or of a profile with other effects.
+        """
+        state = read_as(DriveState, values, where)
+        state.hidden = [
+            read_as(effect.State, own, f"{where}.hidden[{index}]")
+            for index, (effect, own) in enumerate(zip(self.hidden, state.hidden, strict=True))
+        ]
+        if state.core is not None:
+            self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
+            state.core = self._core.state
+        self.state = state
+
+
+class ResponseStreamState(msgspec.Struct, forbid_unknown_fields=True):
+    """The response to one effect's columns: where it is, rows that are ready, and how many of these are dropped."""
+
+    response: ResponseState
+    ready: list[FloatArray]
+    drop: int
+
+
+class ResponseStream:
+    """A driver's response to one effect's columns, row by row; `ahead` are the rows of its preview."""
+
+    def __init__(self, effect: ColumnEffect, step: float) -> None:
+        self.effect = effect
+        self._response = effect.response_in_blocks(step)
+        self.ahead = self._response.ahead
+        self.state = ResponseStreamState(self._response.state, [], 0)
+
+    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
+        """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""
+        state = self.state
+        state.drop += before
+        state.ready.extend(self._response.take(self.effect.known(row)))
+        dropped = min(state.drop, len(state.ready))
+        del state.ready[:dropped]
+        state.drop -= dropped
+
+    def next(self) -> EffectTerms:
+        """Terms at the next row, each of shape (1,)."""
+        return self.effect.acting(self.state.ready.pop(0)[None, :])
+
+    def restore(self, state: ResponseStreamState) -> None:
+        """Back to a state."""
+        self.state, self._response.state = state, state.response
+
+
+def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
+    """What several effects do together: locations add up, factors multiply."""
+    location = spread = rate = fine = None
+    for term in terms:
+        if term.location is not None:
+            location = term.location if location is None else location + term.location
+        if term.spread is not None:
+            spread = term.spread if spread is None else spread * term.spread
+        if term.rate is not None:
+            rate = term.rate if rate is None else rate * term.rate
+        if term.fine is not None:
+            fine = term.fine if fine is None else fine * term.fine
+    return EffectTerms(location, spread, rate, fine)
+
+
+def _start(profile: DriverProfile, offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
+    if offset is None:
+        return None
+    location = 0.0 if terms.location is None else float(terms.location[0])
+    by_lane, by_hand = (float(scale[0]) for scale in profile.scales(width[:1]))
+    return Start(
+        rel_offset=(offset - location) / by_lane,
+        spread=1.0 if terms.spread is None else float(terms.spread[0]),
+        fine=(1.0 if terms.fine is None else float(terms.fine[0])) * by_hand / by_lane,
+    )

@@ -31,23 +31,16 @@ class SensorModel(Record, frozen=True):
 
     later = ("second_view",)
 
-    white: float
-    """One-sided power density of the white part. [m2/Hz]"""
-    coloured: float = 0.0
-    """That of the low-passed part at frequency 0. [m2/Hz]"""
-    corner: float = 1.0
-    """Of the low-passed part. [Hz]"""
-    order: int = 0
-    """Of its Butterworth shape; 0 where there is none."""
-    rounding: float = 0.0
-    """Step that values come in; 0 where none was found. [m]"""
-    driver_variance: float = 0.0
-    """Of the measured rows, as `sensor_variance`; their sum is the measured variance. [m2]"""
+    white: float  # One-sided power density of the white part. [m2/Hz]
+    coloured: float = 0.0  # That of the low-passed part at frequency 0. [m2/Hz]
+    corner: float = 1.0  # Of the low-passed part. [Hz]
+    order: int = 0  # Of its Butterworth shape; 0 where there is none.
+    rounding: float = 0.0  # Step that values come in; 0 where none was found. [m]
+    driver_variance: float = 0.0  # Of the measured rows, as `sensor_variance`; their sum is the measured variance. [m2]
     sensor_variance: float = 0.0
-    driver_share: tuple[float, float] = (0.0, 1.0)
-    """Share of the driver: 95 % interval. [-]"""
+    driver_share: tuple[float, float] = (0.0, 1.0)  # Share of the driver: 95 % interval. [-]
+    # Power of the error over that of half the lane width, where it was estimated so (`second_view`); else 0. [-]
     second_view: float = 0.0
-    """Power of the error over that of half the lane width, where it was estimated so (`second_view`); else 0. [-]"""
 
     def __post_init__(self) -> None:
         levels = (self.white, self.coloured, self.rounding, self.second_view)

@@ -18,9 +18,9 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Acts
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
 from xosc_lateral.drivers.model.plausibility import check_context
-from xosc_lateral.drivers.model.process import DriveProcess, ResponseStream, ResponseStreamState, combine
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.drivers.model.sampling import DriveProcess, ResponseStream, ResponseStreamState, combine
 
 BLOCK = 64
 """Model steps drawn at once. [-]"""

@@ -30,8 +30,8 @@ class Band(Record, frozen=True):
     low: Annotated[float, Meta(ge=0, description="[Hz]")]
     high: Annotated[float, Meta(gt=0, description="[Hz]")]
     source: str = ""
+    # Of that recording, where it is another than the profile's; beyond, movement grows by its law. [m/s]
     speed: Interval | None = None
-    """Of that recording, where it is another than the profile's; beyond, movement grows by its law. [m/s]"""
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
@@ -45,25 +45,13 @@ class Band(Record, frozen=True):
 
 
 class Validity(Record, frozen=True):
-    """Where a profile is known to hold; what is not stated is not known.
+    """Where a profile is known to hold; what is not stated is not known."""
 
-    Parameters
-    ----------
-    bands : tuple of Band
-        Lowest first; movement above the last one is assumed.
-    speed, lane_width : tuple of float, optional
-        Least and greatest of what was measured. [m/s], [m]
-    roads : tuple of str
-        In words: "motorway".
-    resolution : float
-        Of the offsets that the profile was fitted to; 0: not known. [m]
-    """
-
-    bands: tuple[Band, ...] = ()
-    speed: Interval | None = None
-    lane_width: Interval | None = None
-    roads: tuple[str, ...] = ()
-    resolution: Annotated[float, Meta(ge=0, description="Of the offsets fitted. [m]")] = 0.0
+    bands: Annotated[tuple[Band, ...], Meta(description="Lowest first; above the last one movement is assumed.")] = ()
+    speed: Annotated[Interval | None, Meta(description="Least and greatest measured. [m/s]")] = None
+    lane_width: Annotated[Interval | None, Meta(description="Least and greatest measured. [m]")] = None
+    roads: Annotated[tuple[str, ...], Meta(description='In words: "motorway".')] = ()
+    resolution: Annotated[float, Meta(ge=0, description="Of the offsets fitted; 0: not known. [m]")] = 0.0
 
     def __post_init__(self) -> None:
         for name in ("speed", "lane_width"):

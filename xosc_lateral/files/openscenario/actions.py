@@ -19,7 +19,6 @@ from xosc_lateral.files.openscenario.positions import READERS as POSITION_READER
 from xosc_lateral.files.openscenario.positions import read_position
 from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.enums import DynamicsShape
-from xosc_lateral.world.scenario.expressions import ExpressionError
 from xosc_lateral.world.scenario.global_actions import (
     AddEntityAction,
     DeleteEntityAction,
@@ -35,6 +34,7 @@ from xosc_lateral.world.scenario.global_actions import (
     VariableModifyAction,
     VariableSetAction,
 )
+from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import (
     AcquirePositionAction,

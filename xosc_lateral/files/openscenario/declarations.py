@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
-from xosc_lateral.world.scenario.expressions import ExpressionError
-from xosc_lateral.world.scenario.parameters import Scope, satisfies
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope, satisfies
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.scenario import Parameter
 

@@ -11,8 +11,7 @@ from typing import NoReturn, TypeVar, cast
 from lxml import etree
 
 from xosc_lateral.world.scenario.enums import SYNONYMS
-from xosc_lateral.world.scenario.expressions import ExpressionError
-from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place
 
 E = TypeVar("E", bound=StrEnum)

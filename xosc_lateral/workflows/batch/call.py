@@ -23,8 +23,8 @@ from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import frame_requests
-from xosc_lateral.workflows.conversion.options import spelled_out
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
+from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
 if TYPE_CHECKING:

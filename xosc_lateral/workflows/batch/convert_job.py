@@ -28,7 +28,7 @@ def convert_job(job: Job) -> ManifestRow:
     _refuse_changes(job)
     for path in filter(None, (job.output, job.page)):
         make_own_folder(path.parent, depth=job.name.count("/"))
-    conversion = convert_scenario(job.source, job.output, job.settings, variant=job.variant)
+    conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
     _refuse_changes(job)
     if job.page is not None:
         write_page_and_thumbnail(conversion, job.page)

@@ -22,8 +22,8 @@ from xosc_lateral.files.openscenario.provenance import HEADER_MARK
 from xosc_lateral.files.output_paths import file_name
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
-from xosc_lateral.workflows.conversion.options import Option, as_it_is, whole_number
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
+from xosc_lateral.workflows.options import Option, as_it_is, whole_number
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
@@ -27,6 +27,7 @@ from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_ma
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
@@ -121,13 +122,14 @@ class _Origin:
         return cls(facts, scenario, replace(settings, **places), variant)
 
 
+@declare_options
 def verify(
     outputs: Paths,
     *,
     library: Paths = (),
     allow: Paths = (),
     road_path: Paths = (),
-    fast: bool = False,
+    fast: Annotated[bool, flag("--fast", help="Compare hashes alone; make nothing again.")] = False,
     workers: int = 0,
 ) -> Verification:
     """Whether outputs are what their provenance says, and what today's inputs and program would give.
@@ -231,7 +233,8 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(origin.scenario, output, origin.settings, variant=origin.variant - 1, saves=False).data
+    index = origin.variant - 1
+    made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
@@ -279,6 +282,7 @@ def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str
     return None if same else f"profile {profile.name!r} of {entity!r} has changed"
 
 
+@declare_options
 def reproduce(
     output: PathLike,
     new: PathLike,
@@ -320,7 +324,7 @@ def reproduce(
         return Verification(list(_reproduce_folder(old, target.absolute(), search, workers)), _SAME)
     claim([target], [old], force=force)
     origin = _Origin.of(old, read_source(old).data, search)
-    convert_scenario(origin.scenario, target, origin.settings, variant=origin.variant - 1)
+    convert_scenario(origin.scenario, target, origin.settings, variant_index=origin.variant - 1)
     return Verification([_compared(old, target, origin)], _SAME)
 
 

@@ -53,15 +53,15 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
 
 
-def stay_as_written(enriched: Enriched, through: Collection[str]) -> tuple[str, ...]:
+def stay_as_written(enriched: Enriched, continuous: Collection[str]) -> tuple[str, ...]:
     """Which lane changes and lane offsets stay as written although they are to be lifelike, a line each.
 
-    `through`: entities whose movement goes on through them.
+    `continuous`: entities whose movement goes on through them.
     """
     lines = []
     for entity in enriched.entities:
         spans = (span for span in entity.spans if span.kind is SegmentKind.LATERAL_ACTION)
-        if entity.is_enriched and entity.name not in through and any(spans):
+        if entity.is_enriched and entity.name not in continuous and any(spans):
             lines.append(f"lane changes of '{entity.name}' stay as written: it keeps its actions, the player moves it")
         for crossing in entity.crossings if entity.is_enriched else ():
             if crossing.stays:

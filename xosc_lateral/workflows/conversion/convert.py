@@ -1,37 +1,37 @@
-"""`convert`: a maneuver-based scenario in, a lifelike one out, in six steps over one plan."""
+"""`convert`: a maneuver-based scenario in, a lifelike one out. Load, play, decide, sample, write, check."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
-from xosc_lateral.base.rows import beside
+from xosc_lateral.base.rows import spilling_to
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.enrich import enrich, seed_words
+from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
 from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning, meaning_of
-from xosc_lateral.workflows.conversion.options import spelled_out
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
-from xosc_lateral.workflows.conversion.result import Enriched, EventShift, LaneChanges
+from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
+from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
 from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
-SUPPLY = 60.0
-"""For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
-is the same again; some of the slow movement of a driver is seen in that time. [s]"""
+SUPPLY_TIME = 60.0
+"""Of movement that each segment of a reactive output gets at least; a run in which it lasts longer repeats it. Some of
+a driver's slow movement is seen in that time. [s]"""
 
 
 @spelled_out(ConvertSettings)
@@ -54,7 +54,7 @@ def convert(
         File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
         references as seen from the scenario's folder.
     variant : int
-        From 1: another one, other offsets.
+        From 1; each has other offsets.
     report : str or Path, optional
         HTML page to write about what was changed.
     force : bool
@@ -71,10 +71,12 @@ def convert(
         raise ValueError(f"variant {variant}, they count from 1")
     settings = ConvertSettings.of(**options)
     source = Path(scenario)
-    written = source if output is None else output_scenario(output, source)
-    page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
-    claim([None if output is None else written, page], [source], force=force)
-    conversion = convert_scenario(source, written, settings, variant=variant - 1, report=page, saves=output is not None)
+    target = source if output is None else output_scenario(output, source)
+    page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
+    claim([None if output is None else target, page], [source], force=force)
+    conversion = convert_scenario(
+        source, target, settings, variant_index=variant - 1, report=page, saves=output is not None
+    )
     if page is not None:
         conversion.write_report(page, force=force)
     return conversion
@@ -85,22 +87,21 @@ def convert_scenario(
     output: Path,
     settings: ConvertSettings,
     *,
-    variant: int = 0,
+    variant_index: int = 0,
     report: Path | None = None,
     saves: bool = True,
 ) -> Conversion:
     """Convert one scenario.
 
     - `output`: where the converted one goes; its folder has to exist
-    - `variant`: number of the variant: another one, other offsets
-    - `report`: where the caller will write a report: refused like the output if it can't be meant, before anything is
-      written
+    - `variant_index`: from 0; each has other offsets
+    - `report`: where the caller will write a report: refused, as `output` is, where a file lies that is read here
     - `saves`: write the output; else the result holds its bytes, with file references as seen from `output`'s folder
 
     Raises `XoscLateralError`: when the input is at fault; nothing is written then; `OSError`: when the output can't be
     written; nothing is left half-written.
     """
-    with guarding_inputs(), beside(output.parent if saves else None):
+    with guarding_inputs(), spilling_to(output.parent if saves else None):
         loaded = load_scenario(
             source,
             parameters=settings.parameters,
@@ -109,112 +110,105 @@ def convert_scenario(
             strict=settings.strict,
         )
         played = play_loaded(loaded, settings.step, settings.time_limit)
-        plan = decide(loaded, played, settings, output=output, variant=variant, report=report, saves=saves)
+        plan = decide(loaded, played, settings, output=output, variant_index=variant_index, report=report, saves=saves)
         sampled = sample(plan)
         written = write(plan, sampled)
-        checked = check(plan, sampled, written)
+        checked = check(plan, written)
+        if plan.saves and not plan.is_replay:  # which is in its place already
+            write_atomically(plan.output, checked.file.data)
         return _conversion(plan, checked)
 
 
 def sample(plan: Plan) -> Enriched:
     """Offsets of every vehicle that has a driver, for the run that they are for."""
-    settings = plan.settings
+    settings, played = plan.settings, plan.played
     try:
         return enrich(
-            plan.extended.motion,
-            plan.played.network,
+            plan.extended.motion,  # all else of the extended run is that of the played one
+            played.network,
             plan.drivers,
             seed=settings.seed,
-            variant=plan.variant,
-            entropy=seed_words(plan.played.motion, plan.played.network),
+            variant=plan.variant_index,
+            seed_words=seed_words_of(played.motion, played.network),
             context=plan.context,
-            trailers=plan.played.trailers,
+            trailers=played.trailers,
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
             neighbours=settings.neighbours,
             uncertain=plan.depends.entities,
             heeds_controllers=heeds_controllers(settings),
-            through=plan.through,
+            continuous=plan.continuous,
             lane_changes=settings.lane_changes,
-            at_least=0.0 if plan.is_replay else SUPPLY,
+            least_time=0.0 if plan.is_replay else SUPPLY_TIME,
         )
-    except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
+    except DriverProfileError as error:  # sampling does not know the file
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Checked:
-    """An output in which what happens is what happened before, as far as can be had; `enriched`: as it is played."""
-
-    enriched: Enriched
-    written: Written
-    shifts: tuple[EventShift, ...] = ()
-    warnings: tuple[str, ...] = ()
-
-
-def check(plan: Plan, sampled: Enriched, first: Written) -> Checked:
-    """Play a reactive output under several egos, make moves smaller that change what happens, and put it in place.
+def check(plan: Plan, written: Written) -> Written:
+    """Play a reactive output, the ego driving in several ways, and make moves smaller where they change what happens.
 
     A replay follows the clock: nothing can happen otherwise.
     """
     if plan.is_replay:
-        return Checked(sampled, first)
+        return written
     settings, source = plan.settings, plan.played.scenario
     meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
 
     def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
-        written = first if chains == first.chains else write_with(chains, plan, sampled, first.vehicles)
-        output = read_output(written.file.data, plan.output, source, allowed=settings.allow, roads=settings.roads)
-        comparisons, run = meaning.compare(output, first.vehicles.trajectories)
-        return (written, output, run), comparisons
+        trial = written
+        if chains is not written.chains:
+            trial = write_with(chains, plan, written.movement, written.vehicles)
+        # Parsed as if it lay at its place already.
+        output = read_output(trial.file.data, plan.output, source, allowed=settings.allow, roads=settings.roads)
+        comparisons, run = meaning.compare(output, written.vehicles.trajectories)
+        return (trial, output, run), comparisons
 
-    (written, output, run), kept = keep_meaning(first.chains, plan.played.motion, attempt)
-    left = first.vehicles.lane_offsets - written.with_lane_offsets
-    enriched = as_played(sampled, output, run, written.with_lane_offsets, left)
-    if plan.saves:
-        write_atomically(plan.output, written.file.data)
-    return Checked(enriched, written, kept.shifts, tuple(kept.warnings(left)))
+    (best, output, run), kept = keep_meaning(written.chains, plan.played.motion, attempt)
+    unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
+    movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
+    return replace(best, movement=movement, shifts=kept.shifts, warnings=tuple(kept.warnings(unmoved)))
 
 
-def _conversion(plan: Plan, checked: Checked) -> Conversion:
+def _conversion(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
-    enriched, written = checked.enriched, checked.written
-    cut_off, lifelike = plan.played.motion.cut_off, plan.settings.lane_changes is LaneChanges.LIFELIKE
+    movement, file, cut_off = written.movement, written.file, plan.played.motion.cut_off
+    wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
     warnings = (
         *(() if cut_off is None else (str(cut_off),)),
-        *enriched.warnings(),
-        *(f"{removed.place.element}: left out ({removed.reason})" for removed in written.file.removed),
+        *movement.warnings(),
+        *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),
         *(f"'{name}' follows a trajectory, too: {why}" for name, why in plan.unwritable.items()),
-        *written.file.notes,
+        *file.notes,
         *written.vehicles.frozen,
-        *checked.warnings,
-        *(stay_as_written(enriched, plan.through) if lifelike else ()),
-        *validity_warnings(enriched),
+        *written.warnings,
+        *(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
+        *validity_warnings(movement),
     )
     return Conversion(
-        plan.source,
-        plan.output if plan.saves else None,
-        written.file.sha256,
-        enriched,
-        written.provenance,
-        warnings,
-        written.file.data,
-        plan.is_replay,
-        checked.shifts,
-        plan.controllers,
+        source=plan.source,
+        output=plan.output if plan.saves else None,
+        sha256=file.sha256,
+        movement=movement,
+        provenance=written.provenance,
+        warnings=warnings,
+        content=file.data,
+        is_replay=plan.is_replay,
+        shifts=written.shifts,
+        controllers=plan.controllers,
     )
 
 
 def output_scenario(output: PathLike, source: Path) -> Path:
-    """Path of a converted scenario; in a folder its source's name, `_lifelike` where that would be the source."""
+    """Path of a converted scenario; in a folder its source's name, that of `default_output` where the source is."""
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     path = output_file(output, source.name, SCENARIO_SUFFIXES)
-    same = path.parent.resolve() == source.parent.resolve() and path.name == source.name
-    return lifelike(source) if same and path != Path(output) else path
+    is_source = path.parent.resolve() == source.parent.resolve() and path.name == source.name
+    return default_output(source) if is_source and path != Path(output) else path
 
 
-def lifelike(source: Path) -> Path:
+def default_output(source: Path) -> Path:
     """Where a converted scenario goes unless told otherwise: beside its source."""
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
 

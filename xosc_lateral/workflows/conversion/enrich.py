@@ -7,15 +7,13 @@ import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import BLOCK, blocks, columns, stored
-from xosc_lateral.drivers.model.drivability import drivable
-from xosc_lateral.drivers.model.plausibility import check_offsets
+from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
@@ -32,11 +30,16 @@ from xosc_lateral.workflows.conversion.result import (
 )
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
-from xosc_lateral.world.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
-from xosc_lateral.world.motion.trajectory import displace, distance_driven
+from xosc_lateral.world.motion.trajectory import (
+    SETTLING_TIME,
+    SampledDeviation,
+    deviation_through,
+    displace,
+    distance_driven,
+)
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
 
@@ -48,7 +51,7 @@ def enrich(
     *,
     seed: int,
     variant: int = 0,
-    entropy: Mapping[str, Sequence[int]] | None = None,
+    seed_words: Mapping[str, Sequence[int]] | None = None,
     context: Contexts | None = None,
     trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
@@ -56,15 +59,15 @@ def enrich(
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
     heeds_controllers: bool = True,
-    through: Collection[str] = (),
+    continuous: Collection[str] = (),
     lane_changes: LaneChanges = LaneChanges.WRITTEN,
-    at_least: float = 0.0,
+    least_time: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
 
     - `drivers`: per entity a profile, or the reason why it is not enriched; as one that is absent
-    - `seed`, `variant`, `entropy`: with the entity's name they seed its own random numbers: adding an entity changes no
-      other's offsets; `entropy` holds further words of each entity
+    - `seed`, `variant`, `seed_words`: with the entity's name they seed its own random numbers: adding an entity changes
+      no other's offsets; `seed_words` holds further words of each entity
     - `context`: what the scenario doesn't state, or replaces: times [s] and values, the same for all entities
     - `trailers`: entity that is pulled -> its tractor, in whose track it follows
     - `attempts`: sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the
@@ -76,47 +79,49 @@ def enrich(
     - `uncertain`: entities whose motion will be another one, since it depends on a vehicle under test or a controller:
       nobody responds to where they nominally are, nor do they to others
     - `heeds_controllers`: where a controller of the player steers, nothing is sampled
-    - `through`: entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the
+    - `continuous`: entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the
       others leads from the segment before to the one behind
     - `lane_changes`: the way across of those lane changes and lane offsets
-    - `at_least`: for which each segment is sampled, should it last longer in another run [s]
+    - `least_time`: for which each segment is sampled, should it last longer in another run [s]
 
     Raises `DriverProfileError`: the sensor is asked for and a profile knows of none.
     """
-    trailers, words = trailers or {}, entropy or {}
-    run = (_kept_run if _is_small(motion) else _Run)(
-        motion, network, frozenset(trailers), frozenset(uncertain), frozenset(through), neighbours, heeds_controllers
+    trailers, words = trailers or {}, seed_words or {}
+    scene = (_kept_scene if _is_small(motion) else _Scene)(
+        motion, network, frozenset(trailers), frozenset(uncertain), frozenset(continuous), neighbours, heeds_controllers
     )
-    lifelike = lane_changes is LaneChanges.LIFELIKE
+    least_rows = round(least_time / SAMPLE_STEP)
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
-        driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
+        driver, spans = drivers.get(entity.name, "not chosen"), scene.spans[index]
         if isinstance(driver, str):
             return _Drawn(entity, spans, why=driver)
-        seed_words = [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
-        blank = _Drawn(entity, spans, driver, run.seen(index, driver, context or {}), run.crossings[index], lifelike)
-        return _draw(blank, driver, np.random.SeedSequence(seed_words), with_sensor, round(at_least / SAMPLE_STEP))
+        seeds = np.random.SeedSequence(
+            [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
+        )
+        seen, lifelike = scene.seen(index, driver, context or {}), lane_changes is LaneChanges.LIFELIKE
+        blank = _Drawn(entity, spans, driver, seen, scene.crossings[index], lifelike)
+        return _draw(blank, driver, seeds, with_sensor, least_rows)
 
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
         drawn = [drawn_for(index, attempt) for index in range(len(motion.entities))]
         if neighbours is Neighbours.BORROW:
             drawn = _apart(drawn, motion, network, uncertain)
-        entities = tuple(_result(one, network) for one in drawn)
-        entities = _with_trailers(entities, network, trailers)
+        entities = _with_trailers([_result(one, network) for one in drawn], network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
-        departures = tuple(chain.from_iterable(lane_departures(entity, network) for entity in entities))
-        result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
-        if best is None or _trouble(result) < _trouble(best):
+        departures = tuple(departure for entity in entities for departure in lane_departures(entity, network))
+        result = Enriched(motion, network, entities, scene.gaps, gaps_after, departures, seed, variant, attempt)
+        if best is None or result.trouble < best.trouble:
             best = result
-        if not _trouble(result):
+        if not result.trouble:
             break
     assert best is not None
     return best
 
 
-def seed_words(motion: NominalMotion, network: RoadNetwork) -> dict[str, tuple[int, ...]]:
+def seed_words_of(motion: NominalMotion, network: RoadNetwork) -> dict[str, tuple[int, ...]]:
     """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
     words = {}
     for entity in motion.entities:
@@ -129,10 +134,6 @@ def seed_words(motion: NominalMotion, network: RoadNetwork) -> dict[str, tuple[i
         digest = hashlib.sha256("\0".join(start).encode()).digest()
         words[entity.name] = tuple(int.from_bytes(digest[k : k + 4], "little") for k in range(0, 16, 4))
     return words
-
-
-def _trouble(enriched: Enriched) -> int:
-    return len(enriched.new_contacts) + len(enriched.departures)
 
 
 class _Sample(NamedTuple):
@@ -189,7 +190,7 @@ KEPT_ROWS = 100_000
 for two minutes then keeps about 10 MB. [-]"""
 
 
-class _Run:
+class _Scene:
     """What all variants of a run have in common; for the arguments see `enrich`, `pulled` are its trailers."""
 
     def __init__(
@@ -198,7 +199,7 @@ class _Run:
         network: RoadNetwork,
         pulled: frozenset[str],
         uncertain: frozenset[str],
-        through: frozenset[str],
+        continuous: frozenset[str],
         neighbours: Neighbours,
         heeds_controllers: bool,
     ) -> None:
@@ -209,7 +210,7 @@ class _Run:
         ]
         self.runs = [
             movement_runs(motion, entity, network, spans)
-            if entity.name in through
+            if entity.name in continuous
             else tuple((span,) for span in spans if span.is_road_following)
             for entity, spans in zip(motion.entities, self.spans, strict=True)
         ]
@@ -239,7 +240,7 @@ def _is_small(motion: NominalMotion) -> bool:
     return sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS
 
 
-_kept_run = lru_cache(maxsize=2)(_Run)  # variants of one run come one after another
+_kept_scene = lru_cache(maxsize=2)(_Scene)  # variants of one run come one after another
 
 
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:
@@ -332,7 +333,7 @@ def _parts(sample: _Sample, entity: EntityMotion) -> Iterator[SampledSegment]:
 
 
 def _with_trailers(
-    entities: tuple[EntityResult, ...], network: RoadNetwork, trailers: Mapping[str, str]
+    entities: Sequence[EntityResult], network: RoadNetwork, trailers: Mapping[str, str]
 ) -> tuple[EntityResult, ...]:
     """Trailers in their tractor's track: its deviation, where its coupling was one trailer length ago."""
     results = {entity.name: entity for entity in entities}

@@ -10,7 +10,7 @@ from pathlib import Path
 from xosc_lateral.files.opendrive import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
-from xosc_lateral.workflows.conversion.settings import STEP
+from xosc_lateral.workflows.options import STEP
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork

@@ -13,9 +13,9 @@ from xosc_lateral.base.errors import FormatError, did_you_mean, locate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.openscenario.write.build import Version
 from xosc_lateral.files.openscenario.write.draft import Player
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
-from xosc_lateral.files.openscenario.write.trajectory_scenario import motion_unknown_to
+from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.files.tables import ContextTable, read_context
@@ -25,19 +25,12 @@ from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.dependence import (
-    Control,
-    Dependence,
-    actors_of,
-    conditions_of,
-    controlled_entities,
-    dependence,
-    vehicles_under_test,
-)
+from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
+from xosc_lateral.world.scenario.dependence import Dependence, dependence
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction
-from xosc_lateral.world.scenario.scenario import Condition, Scenario
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
@@ -49,7 +42,7 @@ class Plan:
     """One conversion, decided."""
 
     settings: ConvertSettings
-    variant: int
+    variant_index: int  # from 0: each has other offsets
     source: Path
     output: Path  # where it goes; it is written there if it `saves`
     saves: bool
@@ -62,7 +55,7 @@ class Plan:
     depends: Dependence  # on either
     is_replay: bool  # everything happens by the clock of the nominal run, whoever drives
     drivers: Drivers
-    through: frozenset[str]  # whose movement goes on through lane changes: they follow trajectories
+    continuous: frozenset[str]  # whose movement goes on through lane changes: they may follow trajectories
     context: ContextTable | None
     # unwritable: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
     unwritable: Mapping[str, str]
@@ -106,7 +99,7 @@ def decide(
     settings: ConvertSettings,
     *,
     output: Path,
-    variant: int = 0,
+    variant_index: int = 0,
     report: Path | None = None,
     saves: bool = True,
 ) -> Plan:
@@ -128,11 +121,11 @@ def decide(
         inputs[settings.context] = context.sha256
     refuse_outputs([output if saves else None, report], inputs)
     drivers = choose_drivers(scenario, settings, egos, controllers if target.player is Player.CARLA else {})
-    through = _on_trajectories(scenario, settings, depends, frozenset(drivers))
+    continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
     version = target.version_for(scenario)
     plan = Plan(
         settings,
-        variant,
+        variant_index,
         scenario.path,
         output,
         saves,
@@ -145,13 +138,13 @@ def decide(
         depends,
         _is_replay(settings, depends),
         _without_proving_grounds(drivers, played.motion, played.network, settings.entity),
-        through,
+        continuous,
         context,
         _unwritable(played, settings, version, {*egos, *controllers}),
         LateralActions.of(scenario),
     )
     if settings.lane_changes is LaneChanges.LIFELIKE:
-        _refuse_steps(scenario, through)
+        _refuse_steps(scenario, continuous)
     return plan
 
 
@@ -253,12 +246,11 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
 
 def _refuse_steps(scenario: Scenario, names: Collection[str]) -> None:
     """Raise `FormatError` where a lane change of these entities takes no time, but is to be lifelike."""
-    for _, act, group in scenario.storyboard.groups():
-        for _, event in group.events():
-            for content in (action.content for action in event.actions):
-                is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-                if is_step and set(actors_of(act, group, event)) & set(names):
-                    raise content.place.error("a step has no way across: take --lane-changes written")
+    for at in scenario.storyboard.events():
+        for content in (action.content for action in at.event.actions):
+            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
+            if is_step and set(at.actors) & set(names):
+                raise content.place.error("a step has no way across: take --lane-changes written")
 
 
 NO_DRIVER = {

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.drivability import Bound
+from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
@@ -20,7 +20,7 @@ from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.dependence import Control
+from xosc_lateral.world.scenario.controllers import Control
 
 
 class Neighbours(StrEnum):
@@ -172,6 +172,11 @@ class Enriched:
         return tuple(
             gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
         )
+
+    @property
+    def trouble(self) -> int:
+        """Contacts and lane departures that nominally are none. [-]"""
+        return len(self.new_contacts) + len(self.departures)
 
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""

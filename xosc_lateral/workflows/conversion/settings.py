@@ -17,18 +17,15 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.configuration import SETTINGS, configuration
 from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.openscenario.write.draft import Player, TargetPlayer, target
-from xosc_lateral.workflows.conversion import options as say
-from xosc_lateral.workflows.conversion.options import Option, PathLike, Paths, ProfileLike, option
+from xosc_lateral.workflows import options as say
 from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours
+from xosc_lateral.workflows.options import STEP, Option, PathLike, Paths, ProfileLike, option
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
 
 LEAST_STEP = 1e-3
 """Of a simulation; below, a minute is a gigabyte. [s]"""
-
-STEP = 0.02
-"""Of playback, as in the reference logs. [s]"""
 
 AUTO = "auto"
 """Profile name for the shipped population, and for nobody who has no driver (a trailer, a tram)."""

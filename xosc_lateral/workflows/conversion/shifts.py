@@ -24,7 +24,7 @@ from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
-from xosc_lateral.world.scenario.dependence import conditions_of, entity_references, refers_to
+from xosc_lateral.world.scenario.dependence import entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
@@ -32,7 +32,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LaneOffsetAction,
     LateralDistanceAction,
 )
-from xosc_lateral.world.scenario.scenario import Condition, Scenario, Trigger
+from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
@@ -255,13 +255,10 @@ def _nearest(shift: float, causes: Sequence[float]) -> float:
 
 def _triggers_of(scenario: Scenario) -> dict[Path, tuple[Condition, ...]]:
     """Conditions that the start of each event waits for."""
-    conditions: dict[Path, tuple[Condition, ...]] = {}
-    for story, act, group in scenario.storyboard.groups():
-        for maneuver, event in group.events():
-            triggers: tuple[Trigger | None, ...] = (act.start_trigger, event.start_trigger)
-            path = (story.name, act.name, group.name, maneuver.name, event.name)
-            conditions[path] = tuple(condition for trigger in triggers for condition in conditions_of(trigger))
-    return conditions
+    return {
+        at.path: (*conditions_of(at.act.start_trigger), *conditions_of(at.event.start_trigger))
+        for at in scenario.storyboard.events()
+    }
 
 
 def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedAction]) -> Iterator[Change]:

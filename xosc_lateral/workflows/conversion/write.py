@@ -16,22 +16,28 @@ from xosc_lateral.files.openscenario.provenance import PENDING
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralAction
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralAction
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
+from xosc_lateral.workflows.conversion.result import (
+    ConversionProvenance,
+    Enriched,
+    EntityResult,
+    EventShift,
+    SampledSegment,
+)
 from xosc_lateral.workflows.conversion.settings import OutputMode, relative
-from xosc_lateral.world.motion.deviation import (
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
+from xosc_lateral.world.motion.trajectory import (
     SETTLING_TIME,
     NaturalSpline,
     SampledDeviation,
     deviation_through,
+    distance_driven,
     settle,
     smoother_step,
 )
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
-from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 
 LONGEST_TURN = 300.0
@@ -50,12 +56,15 @@ AT_ONCE = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Written:
-    """An output, how its vehicles were to be written, and the chains of those that keep their maneuvers."""
+    """An output: the movement in it, how its vehicles were to be written, what is in the file."""
 
+    movement: Enriched  # as sampled; of a reactive output that was checked, as it is played
     vehicles: WrittenAs
-    chains: tuple[OffsetChain, ...]
+    chains: tuple[OffsetChain, ...]  # of those that keep their maneuvers
     provenance: ConversionProvenance
     file: WrittenScenario
+    shifts: tuple[EventShift, ...] = ()
+    warnings: tuple[str, ...] = ()  # of the check
 
     @property
     def with_lane_offsets(self) -> frozenset[str]:
@@ -64,39 +73,25 @@ class Written:
 
 
 def write(plan: Plan, sampled: Enriched) -> Written:
-    """Write the output: a replay to its place, a reactive one into memory, since it is still to be checked."""
+    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    towing, played = plan.played.trailers.values(), plan.played
-    chains = [
-        chain
-        for entity in sampled.entities
-        if entity.name in vehicles.lane_offsets
-        for chain in chains_of(
-            entity,
-            played.motion,
-            played.network,
-            plan.lateral.by_entity.get(entity.name, ()),
-            tows=entity.name in towing,
-            changes_speed=entity.name in plan.lateral.changing_speed,
-        )
-    ]
-    return write_with(chains, plan, sampled, vehicles)
+    reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
+    return write_with([chain for entity in reactive for chain in _chains_of(entity, plan)], plan, sampled, vehicles)
 
 
 def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
     """Write the output with these chains for those who get lane offsets."""
-    on_trajectories = vehicles.trajectories
     modes = dict.fromkeys((chain.entity for chain in chains), OutputMode.LANE_OFFSET.value)
-    modes |= dict.fromkeys(on_trajectories, OutputMode.TRAJECTORY.value)
-    folder, drivers = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile is not None}
+    modes |= dict.fromkeys(vehicles.trajectories, OutputMode.TRAJECTORY.value)
+    folder, profiles = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
         scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
         inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
-        profiles={name: (profile.name, profile_hash(profile)) for name, profile in drivers.items()},
+        profiles={name: (profile.name, profile_hash(profile)) for name, profile in profiles.items()},
         options=plan.settings.record(folder),
-        variant=plan.variant + 1,
+        variant=plan.variant_index + 1,
         version=named(plan.version),
         ego=tuple(plan.egos),
         modes={name: mode for name, mode in sorted(modes.items()) if sampled.entity(name).is_enriched},
@@ -107,7 +102,7 @@ def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, veh
     file = write_converted(
         plan.extended.scenario,
         plan.extended.motion,
-        {one.name: one.trajectory for one in sampled.entities if one.name in on_trajectories},
+        {one.name: one.trajectory for one in sampled.entities if one.name in vehicles.trajectories},
         plan.output,
         chains=None if plan.is_replay else chains,
         lateral=plan.lateral,
@@ -116,44 +111,39 @@ def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, veh
         save=plan.saves and plan.is_replay,
         target=plan.settings.target,
     )
-    return Written(vehicles, tuple(chains), replace(provenance, content_sha256=file.content_sha256), file)
+    provenance = replace(provenance, content_sha256=file.content_sha256)
+    return Written(sampled, vehicles, tuple(chains), provenance, file)
 
 
-def chains_of(
-    entity: EntityResult,
-    motion: NominalMotion,
-    network: RoadNetwork,
-    items: Collection[LateralAction],
-    *,
-    tows: bool,
-    changes_speed: bool,
-) -> list[OffsetChain]:
+def _chains_of(entity: EntityResult, plan: Plan) -> list[OffsetChain]:
     """Chains of one entity, each with the offsets that it has in the nominal run then, or else with its longest ones.
 
-    Who `tows` a trailer is not put down beside the middle: the trailer would swing. Where something `changes_speed`, it
-    begins with a path by the distance driven.
+    Whoever tows a trailer starts where it is written: put down aside, the trailer would swing. Where something changes
+    its speed, an entity begins with a path by the distance driven.
     """
+    motion, network = plan.played.motion, plan.played.network
+    actions = plan.lateral.by_entity.get(entity.name, ())
+    tows = entity.name in plan.played.trailers.values()
+    is_there = bool(entity.motion.activity[0] & Activity.ACTIVE)
+    add_action_path = next((action.path for action in actions if action.adds and not is_there), None)
     longest = max(entity.segments, key=_length)
-    added = next((item.path for item in items if item.adds and not _is_there_at_start(entity)), None)
-    first = next(iter(_in_phase(entity, motion, added, items)), None)
-    is_placed = first is not None and first.span.first == 0 and not tows
-    ring = _ring(first or longest, from_middle=not is_placed)
-    path = _path(entity, motion, network, items, ring.origin) if changes_speed and not tows else None
-    is_placed = is_placed or path is not None
-    side, middle_t = _middle(entity, network) if is_placed else (1.0, 0.0)
-    begin = ring.origin if path is None else path.offset[0]
-    placed = middle_t + side * begin if is_placed else None
+    first_segment = next(_in_phase(entity, motion, add_action_path, actions), None)
+    starts_aside = first_segment is not None and first_segment.span.first == 0 and not tows
+    ring = _ring(first_segment or longest, from_middle=not starts_aside)
+    path = None
+    if entity.name in plan.lateral.changing_speed and not tows:
+        path = _path(entity, motion, network, actions, ring.origin)
+    side, start_t = 1.0, None
+    if starts_aside or path is not None:
+        side, middle_t = _middle(entity, network)
+        start_t = middle_t + side * (ring.origin if path is None else path.offset[0])
     is_steered = bool(entity.motion.activity[0] & Activity.STEERED)
-    chains = [] if is_steered else [OffsetChain(entity.name, added, ring, placed, side, path)]
-    for item in items:
-        if not item.adds and not item.steers:
-            segment = max(_in_phase(entity, motion, item.path, items), key=_length, default=longest)
-            chains.append(OffsetChain(entity.name, item.path, _ring(segment, from_middle=True)))
+    chains = [] if is_steered else [OffsetChain(entity.name, add_action_path, ring, start_t, side, path)]
+    for action in actions:
+        if not action.adds and not action.steers:
+            segment = max(_in_phase(entity, motion, action.path, actions), key=_length, default=longest)
+            chains.append(OffsetChain(entity.name, action.path, _ring(segment, from_middle=True)))
     return [chain for chain in chains if chain.ring.moves]
-
-
-def _is_there_at_start(entity: EntityResult) -> bool:
-    return bool(entity.motion.activity[0] & Activity.ACTIVE)
 
 
 def _length(segment: SampledSegment) -> float:
@@ -161,17 +151,15 @@ def _length(segment: SampledSegment) -> float:
 
 
 def _in_phase(
-    entity: EntityResult, motion: NominalMotion, after: tuple[str, ...] | None, items: Collection[LateralAction]
+    entity: EntityResult, motion: NominalMotion, after: tuple[str, ...] | None, actions: Collection[LateralAction]
 ) -> Iterator[SampledSegment]:
     """Segments between the end of an action in the nominal run and the next lateral action."""
-    paths = {item.path for item in items if not item.adds}
-    played = [one for one in motion.actions if one.actor == entity.name and one.path in paths]
+    paths = {action.path for action in actions if not action.adds}
+    starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     ends = [one.end for one in motion.actions if one.path == after and one.end is not None]
     begin = 0.0 if after is None else min(ends, default=np.inf)
-    until = min((one.start for one in played if one.start > begin + AT_ONCE), default=np.inf)
-    for segment in entity.segments:
-        if begin - AT_ONCE <= segment.span.start < until:
-            yield segment
+    until = min((start for start in starts if start > begin + AT_ONCE), default=np.inf)
+    return (segment for segment in entity.segments if begin - AT_ONCE <= segment.span.start < until)
 
 
 def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
@@ -184,13 +172,13 @@ def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
 
 
 def _path(
-    entity: EntityResult, motion: NominalMotion, network: RoadNetwork, items: Collection[LateralAction], end: float
+    entity: EntityResult, motion: NominalMotion, network: RoadNetwork, actions: Collection[LateralAction], end: float
 ) -> OffsetPath | None:
     """From the start along what was sampled before the first lateral action and beyond it, to some offset. [m]
 
     On one road alone, up to shortly before its end, where the place of each vertex is certain.
     """
-    vehicle, paths = entity.motion, {item.path for item in items}
+    vehicle, paths = entity.motion, {action.path for action in actions}
     starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     until = min(starts, default=np.inf)
     segments = [segment for segment in entity.segments if segment.span.start < until]
@@ -236,11 +224,8 @@ def _vertices(vehicle: EntityMotion, network: RoadNetwork, driven: FloatArray, l
     gap, distances = np.clip(gap, LEAST_GAP, None), [0.0]
     while distances[-1] < reach:
         distances.append(distances[-1] + float(np.interp(distances[-1], driven[rows], gap)))
-    return (
-        np.append(distances[:-1], reach)
-        if reach - distances[-2] > 0.5 * LEAST_GAP
-        else np.append(distances[:-2], reach)
-    )
+    kept = -1 if reach - distances[-2] > 0.5 * LEAST_GAP else -2
+    return np.append(distances[:kept], reach)
 
 
 def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:

@@ -5,77 +5,69 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.files.mapping import MappingLike, as_mapping
-from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.detection.command import ANSWER_TIME, Command
-from xosc_lateral.workflows.detection.detection import Detection
-from xosc_lateral.workflows.detection.detectors import RULES, Detector, read_rule
-from xosc_lateral.workflows.detection.logistic import train
-from xosc_lateral.workflows.detection.observation import PERFECT, Sensor, View, read_numbers, read_sensor, views_of
-from xosc_lateral.workflows.detection.scoring import Tally
-from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
-from xosc_lateral.workflows.detection.tracks import moves_in_lane
-from xosc_lateral.workflows.result import PathLike, Paths, as_paths
+from xosc_lateral.workflows.options import PathLike, Paths, declare_options, flag
+from xosc_lateral.workflows.options import paths as as_paths
 
 if TYPE_CHECKING:
-    pass
+    from xosc_lateral.files.mapping import MappingLike
+    from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.detection.detectors import Detector
+    from xosc_lateral.workflows.detection.observation import Sensor, View
+    from xosc_lateral.workflows.detection.sources import SourceSettings
 
 ALL_RULES = "all"
 TRAINED = "logistic"
 
 
+def _known_sensor(text: str) -> str:
+    from xosc_lateral.workflows.detection.observation import read_sensor
+
+    read_sensor(text)
+    return text
+
+
+@declare_options
 def detect(
-    sources: Paths,
-    *,
-    detectors: str | Sequence[str] = (ALL_RULES,),
-    ego: str | None = None,
-    variants: int = 0,
-    profiles: str | Sequence[str] = ("motorway",),
-    train: Paths = (),
-    sensor: str | Sensor = PERFECT,
-    threshold: float = 0.5,
-    answer_time: float = ANSWER_TIME,
+    sources: Paths, *,
+    detectors: Annotated[str | Sequence[str], flag("--detector", kind=list[str] | None,
+        metavar='NAME[:OPTION=VALUE,...]|"COMMAND"',
+        help="lateral-speed (threshold, hold), marking-distance, wandering-zone, time-to-line, fuzzy, logistic "
+        "(threshold each), all, or a program of yours; may be repeated. Default: all.")] = (ALL_RULES,),
+    ego: Annotated[str | None, flag(metavar="NAME",
+        help="Count cut-ins into its lane; none: into any neighbouring lane.")] = None,
+    variants: Annotated[int, flag(help="Lifelike variants of each scenario, beside it.", min=0, max=10_000)] = 0,
+    profiles: Annotated[str | Sequence[str], flag("--profile", "-p", kind=list[str] | None, metavar="NAME|PATH",
+        help="Who drives the variants; may be repeated.")] = ("motorway",),
+    train: Annotated[Paths, flag(kind=list[Path] | None, metavar="SOURCE",
+        help="What logistic is trained on; may be repeated.")] = (),
+    sensor: Annotated[str | Sensor, flag(kind=str, read=_known_sensor, metavar="noise=M,delay=S,rate=HZ",
+        help="What detectors see through; usual: 0.05, 0.1, 20.")] = "",
+    threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
+    answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
     seed: int = 0,
-    road: PathLike | None = None,
+    road: Annotated[PathLike | None, flag("--road", kind=Path | None, show_default=False,
+        help="OpenDRIVE file of a recording without one.")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     allow: Paths = (),
     road_path: Paths = (),
     time_limit: float | None = None,
-) -> Detection:
+) -> Detection:  # fmt: skip
     """Count what cut-in detectors do on scenarios, drive tables and recordings, side by side.
 
     Parameters
     ----------
     sources : path or paths
         Scenarios (``.xosc``) and folders of them, nominal or converted; drive tables; recordings and tables of states.
-    detectors : str or sequence of str
-        ``NAME`` or ``NAME:OPTION=VALUE,...`` of a built-in one, ``"all"`` of them, or a command of your own.
     ego : str, optional
         Alarms are for cut-ins into its lane; "none": into any neighbouring lane. Without: a scenario's vehicle under
         test, else none.
     variants : int
         Lifelike variants of each scenario, with each of the profiles, counted beside the scenario as it is.
-    profiles : str or sequence of str
-        Names or paths.
-    train : path or paths
-        Sources that `logistic` is trained on; not used for anything else.
-    sensor : str or Sensor
-        ``noise=0.05,delay=0.1,rate=20`` [m], [s], [Hz], or "usual", which is this.
-    threshold : float
-        Score above which a command's answer is an alarm.
-    answer_time : float
-        Within which a command has to answer a step. [s]
-    seed : int
-        Of variants and of the sensor's noise: the same inputs and seed, the same numbers.
     road : str or Path, optional
         OpenDRIVE file of a recording or table of states that comes without one, or in place of a scenario's.
-    columns : mapping, TableMapping or path, optional
-        What columns of tables are called.
-    library, allow, road_path, time_limit
-        As in `convert`.
 
     Raises
     ------
@@ -86,6 +78,14 @@ def detect(
     ValueError
         A detector, option or sensor that does not exist.
     """
+    from xosc_lateral.files.mapping import as_mapping
+    from xosc_lateral.workflows.conversion.settings import ConvertSettings
+    from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.detection.observation import read_sensor, views_of
+    from xosc_lateral.workflows.detection.scoring import Tally
+    from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
+    from xosc_lateral.workflows.detection.tracks import moves_in_lane
+
     paths = as_paths(sources)
     if not paths:
         raise ValueError("no source to look at")
@@ -123,6 +123,10 @@ def detect(
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
     """A rule or command; the threshold of one that is still to be trained; None: all of them."""
+    from xosc_lateral.workflows.detection.command import Command
+    from xosc_lateral.workflows.detection.detectors import read_rule
+    from xosc_lateral.workflows.detection.observation import read_numbers
+
     name, _, options = word.partition(":")
     if word == ALL_RULES:
         return None
@@ -140,6 +144,9 @@ def _detectors(
     sensor: Sensor,
     seed: int,
 ) -> Iterator[Detector]:
+    from xosc_lateral.workflows.detection.detectors import RULES, Detector
+    from xosc_lateral.workflows.detection.logistic import train
+
     detector = _read_detector(word, threshold, answer_time)
     if isinstance(detector, Detector):
         yield detector
@@ -157,6 +164,9 @@ def _detectors(
 
 
 def _training_views(trainers: Sequence[Path], settings: SourceSettings, sensor: Sensor, seed: int) -> Iterator[View]:
+    from xosc_lateral.workflows.detection.observation import views_of
+    from xosc_lateral.workflows.detection.sources import checked, sources_of
+
     for path in trainers:
         for source in sources_of(path, settings):
             for scene in checked(source):

@@ -109,7 +109,7 @@ def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, setti
             for variant in range(settings.variants):
                 with TemporaryDirectory() as folder:
                     output = Path(folder) / scenario.name
-                    made = convert_scenario(scenario, output, convert, variant=variant)
+                    made = convert_scenario(scenario, output, convert, variant_index=variant)
                     played = _play(output, replace(settings, convert=replace(convert, allow=(*convert.allow, *around))))
                     ego = settings.ego or next(iter(made.provenance.ego), "none")
                     yield played_scene(played, f"{name} #{variant + 1}", ego, cluster=name)

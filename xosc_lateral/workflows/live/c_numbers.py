@@ -26,7 +26,7 @@ from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
 from xosc_lateral.workflows.live import paths
-from xosc_lateral.world.motion.deviation import SETTLING_TIME
+from xosc_lateral.world.motion.trajectory import SETTLING_TIME
 
 USUAL = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
 """Inputs that nobody sets; others are 0, of distances that nobody is there."""

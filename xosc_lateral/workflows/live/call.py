@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
 if TYPE_CHECKING:
@@ -27,20 +28,27 @@ ROW = (*STATES, "z", "pitch", "roll")
 """The same with what only a trace has."""
 
 
+PROFILES = flag("--vehicle", kind=list[str] | None, read=texts, metavar="NAME=PROFILE",
+    help="Another profile for one vehicle; may be repeated.")  # fmt: skip
+EGO = flag(kind=list[str] | None, metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
+FOLDERS = replace(SHARED["library"], flags=("--library",))
+
+
+@declare_options
 def live_esmini(
     scenario: PathLike,
-    library: Any,
-    *,
+    library: Annotated[Any, flag("--player-library", kind=Path, show_default=False,
+        help="libesminiLib.so or esminiLib.dll of esmini 3.")], *,
+    duration: Annotated[float, flag(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
+    step: Annotated[float, flag(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
+    window: Annotated[bool, flag("--window", help="Open esmini's window.")] = False,
     profile: ProfileLike = "motorway",
-    profiles: Mapping[str, ProfileLike] | None = None,
-    ego: Sequence[str] = (),
+    profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
+    ego: Annotated[Sequence[str], EGO] = (),
     seed: int = 0,
-    duration: float = 3600.0,
-    step: float = 0.01,
-    window: bool = False,
-    neighbours: str = Neighbours.BORROW,
-    folders: Paths = (),
-) -> LiveRun:
+    neighbours: str = "borrow",
+    folders: Annotated[Paths, FOLDERS] = (),
+) -> LiveRun:  # fmt: skip
     """Play a scenario in esmini with drivers in its vehicles.
 
     Parameters
@@ -48,22 +56,13 @@ def live_esmini(
     scenario : path
     library : path, ctypes.CDLL, or object with the same functions
         ``libesminiLib.so``, ``esminiLib.dll``: the user's own.
-    profile, profiles
-        Who drives; by vehicle where it is another.
-    ego : sequence of str
-        Vehicles under test: none of our drivers.
-    duration, step : float
-        [s]
-    window : bool
-        Open esmini's.
-    folders : path or paths
-        With further profiles.
 
     Raises
     ------
     SimulationError, FormatError
         In one line.
     """
+    from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.esmini_library import open_player
     from xosc_lateral.workflows.live.scene import Scene
@@ -110,37 +109,36 @@ def live_esmini(
     return LiveRun(rows, settings, [*traffic.warnings, *stood], events, scene)
 
 
+@declare_options
 def live_sumo(
-    config: PathLike,
-    *,
+    config: PathLike, *,
+    duration: Annotated[float, flag(help="Ends here, if not before or as configured. [s]", min=0.01,
+        max=1e7)] = 86_400.0,
+    lateral_resolution: Annotated[float | None,
+        flag(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0)] = None,
     profile: ProfileLike = "motorway",
-    profiles: Mapping[str, ProfileLike] | None = None,
-    ego: Sequence[str] = (),
+    profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
+    ego: Annotated[Sequence[str], EGO] = (),
     seed: int = 0,
-    duration: float = 86_400.0,
-    lateral_resolution: float | None = None,
     options: Sequence[str] = (),
-    neighbours: str = Neighbours.BORROW,
-    folders: Paths = (),
-) -> LiveRun:
+    neighbours: str = "borrow",
+    folders: Annotated[Paths, FOLDERS] = (),
+) -> LiveRun:  # fmt: skip
     """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
 
     Parameters
     ----------
     config : path
         ``.sumocfg``; SUMO's own random seed is as it says.
-    lateral_resolution : float, optional
-        Switches the sublane model on, if the configuration does not. [m]
     options : sequence of str
         Further words of SUMO's command line.
-    profile, profiles, ego, seed, duration, neighbours, folders
-        See `live_esmini`.
 
     Raises
     ------
     SimulationError
         In one line.
     """
+    from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.scene import Scene, sumo_entity, sumo_network
     from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 

@@ -25,9 +25,8 @@ from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.workflows.live.paths import LEADING_OVER, TURN, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
-from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle
-from xosc_lateral.world.scenario.controllers import Domains
-from xosc_lateral.world.scenario.dependence import controlled_entities
+from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
+from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,
     LaneChangeAction,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
-from xosc_lateral.world.motion.deviation import SETTLING_TIME, settle, smoother_step
+from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle, smoother_step
 from xosc_lateral.world.surroundings.around import smooth_step
 from xosc_lateral.world.surroundings.context import STEERING
 

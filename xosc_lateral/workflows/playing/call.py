@@ -4,53 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from msgspec import structs
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.conversion.load import Played, play_scenario
-from xosc_lateral.workflows.conversion.settings import STEP
+from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
-from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
-from xosc_lateral.world.scenario.dependence import controlled_entities
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
+    from xosc_lateral.workflows.conversion.load import Played
+    from xosc_lateral.world.motion.segments import SegmentRow
 
 
+@declare_options
 def play(
-    scenario: PathLike,
-    *,
-    step: float = STEP,
+    scenario: PathLike, *,
+    step: Annotated[float, flag(help="Length of a frame [s].", min=0.001, max=1.0)] = STEP,
     time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
     road: PathLike | None = None,
     road_path: Paths = (),
-    strict: bool = False,
-) -> Playback:
+    strict: Annotated[bool, flag("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
+) -> Playback:  # fmt: skip
     """Play a scenario's maneuvers, without offsets.
 
     Parameters
     ----------
     scenario : str or Path
         Maneuver-based OpenSCENARIO file.
-    step : float
-        Length of a frame. [s]
-    time_limit : float, optional
-        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
-    parameters : mapping, optional
-        Scenario parameters that replace those declared.
-    allow : path or paths
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    road : str or Path, optional
-        The road, whatever the scenario says.
-    road_path : path or paths
-        Folders to look for a road by its name ("Town04").
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
 
@@ -59,6 +43,9 @@ def play(
     FormatError, PlaybackError
         With file, line and element.
     """
+    from xosc_lateral.files.openscenario.read import RoadSearch
+    from xosc_lateral.workflows.conversion.load import play_scenario
+
     values = {name: str(value) for name, value in (parameters or {}).items()}
     return Playback(
         play_scenario(
@@ -73,6 +60,7 @@ def play(
     )
 
 
+@declare_options
 def segments(
     scenario: PathLike | Playback,
     *,
@@ -82,6 +70,8 @@ def segments(
     allow: Paths = (),
 ) -> Segments:
     """Road-following segments of every entity, and why the rest is none; see `play`."""
+    from xosc_lateral.world.scenario.controllers import controlled_entities
+
     played = (
         scenario
         if isinstance(scenario, Playback)
@@ -199,7 +189,7 @@ class Playback(Result):
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
         from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
-        from xosc_lateral.world.scenario.dependence import vehicles_under_test
+        from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
         claim([output], self._inputs(), force=force)
@@ -251,6 +241,8 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
+        from msgspec import structs
+
         rows = [structs.asdict(row) for row in self._rows]
         rounded = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
         return {"segments": rounded, "controllers": list(self.controllers)}
@@ -258,6 +250,8 @@ class Segments(Result):
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:
     """All segments of all entities, in the scenario's order and in order of time."""
+    from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
+
     rows = []
     for motion in played.motion.entities:
         for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers):

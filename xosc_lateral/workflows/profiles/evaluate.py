@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
     GivenDrives,
@@ -25,15 +25,19 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.evaluation.realism import Realism
     from xosc_lateral.drivers.evaluation.scores import ProfileScores
     from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
+@declare_options
 def evaluate(
-    profile: ProfileLike,
+    profile: Annotated[ProfileLike, PROFILE],
     drives: DrivesLike,
     *,
     seed: int = 0,
-    classify: bool = True,
+    classify: Annotated[
+        bool, flag("--classify/--no-classify", help="Also train classifiers (extra `classifier`).")
+    ] = True,
     columns: MappingLike | None = None,
     library: Paths = (),
 ) -> Evaluation:
@@ -46,12 +50,8 @@ def evaluate(
     profile : DriverProfile, path or name
     drives, columns
         See `read_drives`.
-    seed : int
-        Same inputs and seed: same numbers.
     classify : bool
         Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
-    library : path or paths
-        Folders with further profiles.
     """
     from xosc_lateral.drivers.drives.cuts import all_runs
     from xosc_lateral.drivers.evaluation.scores import score_profile

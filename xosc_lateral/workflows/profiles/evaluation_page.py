@@ -12,8 +12,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.realism import Realism
-from xosc_lateral.drivers.evaluation.record import scores_to_dict
-from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores
+from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import PartEvaluation
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED

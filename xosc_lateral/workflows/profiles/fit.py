@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.result import DrivesLike, Paths, ProfileLike, given_drives, given_profile, naming
 
 if TYPE_CHECKING:
@@ -32,22 +33,40 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
     return given_drives(drives, columns).drives
 
 
+def _known_model(text: str) -> str:
+    from xosc_lateral.base.errors import DriverProfileError
+    from xosc_lateral.drivers.model.core.registry import model_named
+
+    try:
+        return model_named(text).model.kind
+    except DriverProfileError as error:
+        raise ValueError(str(error)) from error
+
+
+@declare_options
 def fit(
-    drives: DrivesLike,
-    *,
-    name: str = "",
-    model: str = "autoregressive",
-    corrected: bool = False,
+    drives: DrivesLike, *,
+    model: Annotated[str, flag(read=_known_model, metavar="[two-level|autoregressive|PLUG-IN]",
+        help="two-level: Neis and Beyerer; autoregressive: the default; best: the same.")] = "autoregressive",
+    corrected: Annotated[bool, flag("--corrected",
+        help="Two-level model: freed of its fit's bias, by simulation.")] = False,
     columns: MappingLike | None = None,
-    source: str = "",
-    licence: str = "",
-    sensor_noise: float | None = None,
-    left_hand: bool = False,
-    neighbours: bool | None = None,
-    valid_below: float | None = None,
-    prior: ProfileLike | None = PRIOR,
+    name: Annotated[str, flag(help="Name of the profile; default: the file's name.")] = "",
+    source: Annotated[str, flag(help="Description of the drives, for the provenance.")] = "",
+    licence: Annotated[str, flag(help="Licence of the drives, for the provenance.")] = "",
+    sensor_noise: Annotated[float | None, flag(min=1e-4, max=2,
+        help="Standard deviation of the sensor's error, rounding included [m]; default: estimated.")] = None,
+    left_hand: Annotated[bool, flag("--left-hand", help="Drives of left-hand traffic.")] = False,
+    neighbours: Annotated[bool | None, flag("--neighbours/--no-neighbours",
+        help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.")] = None,
+    valid_below: Annotated[float | None, flag(metavar="HZ", min=0.02, max=2.5,
+        help="Frequency up to which tables show driving that do not state it: smoothed tracks. [Hz]")] = None,
+    prior: Annotated[ProfileLike | None, flag(
+        kind=str, read=lambda text: None if text == "none" else text, metavar="PROFILE|none",
+        help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
+    )] = PRIOR,
     library: Paths = (),
-) -> DriverProfile:
+) -> DriverProfile:  # fmt: skip
     """Fit a driver profile.
 
     Raises `FormatError`, `NotEnoughDataError`, `DriverProfileError`.
@@ -56,36 +75,17 @@ def fit(
     ----------
     drives, columns
         See `read_drives`.
-    name : str
-        Of the profile; else the first table's, without its suffix, or "profile".
-    model : str
-        "two-level": the paper's model to the letter; "autoregressive" (or "best"): ours.
-    corrected : bool
-        Of the two-level model: freed of what its own fit does to it, by simulation.
-    source, licence : str
-        Of the drives, for the provenance.
-    sensor_noise : float, optional
-        Standard deviation of the sensor's error on the offset, rounding included, where it is known; else found from
-        the drives. [m]
-    left_hand : bool
-        The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
     neighbours : bool, optional
         Whether the profile holds how drivers keep away from vehicles beside them; not in the two-level model. None:
         where it can be fitted; True: or an error says why not; False: in no case.
-    valid_below : float, optional
-        Frequency below which drives show driving whose tables do not state it (column `valid_below`): tracks that their
-        provider smoothed. [Hz]
     prior : DriverProfile, path or name, optional
         Whose fast movement the profile has above the band that the drives show: `rural` where tables state a band
         below 0.5 Hz and no other table has one above it, another one also where the sensor hides the driver.
-    library : path or paths
-        Folders with further profiles.
     """
     from msgspec.structs import replace
 
     from xosc_lateral.base.errors import DriverProfileError
     from xosc_lateral.drivers.drives.cleaning import summary_of
-    from xosc_lateral.drivers.fitting.bands import KEEPING_BAND, split_by_band
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
@@ -96,12 +96,7 @@ def fit(
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
-    slow, fast = split_by_band(tables.drives)
-    is_partial = not fast and any(drive.valid_below is not None and drive.valid_below < KEEPING_BAND for drive in slow)
     by_default = isinstance(prior, str) and prior == PRIOR
-    has_prior = prior is not None and (is_partial or not by_default)
-    if by_default and model_named(model).model.kind == ModelKind.TWO_LEVEL:
-        has_prior = False
     known = Provenance(
         source=source or ", ".join(tables.inputs),
         licence=licence,
@@ -116,7 +111,8 @@ def fit(
             provenance=known,
             sensor_noise=sensor_noise,
             neighbours=neighbours,
-            prior=given_profile(prior, library) if has_prior and prior is not None else None,
+            prior=None if prior is None or by_default else given_profile(prior, library),
+            stand_in=(lambda: given_profile(PRIOR, library)) if by_default else None,
         )
     if corrected and isinstance(profile.model, TwoLevelModel):
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})

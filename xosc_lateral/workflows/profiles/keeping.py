@@ -9,10 +9,11 @@ from typing import Any
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
+from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
+@declare_options
 def remove_profiles(names: Sequence[PathLike], library: Paths = ()) -> tuple[Path, ...]:
     """Delete the files of profiles of your own, all or none; those that can't be read go by their id only.
 
@@ -31,6 +32,7 @@ def remove_profiles(names: Sequence[PathLike], library: Paths = ()) -> tuple[Pat
     return tuple(dict.fromkeys(paths))
 
 
+@declare_options
 def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool = False) -> Path:
     """Give a profile of your own another id, in its file and as the file's name.
 
@@ -93,6 +95,7 @@ class ProfileUses(Result):
         return {"id": self.name, "outputs": outputs}
 
 
+@declare_options
 def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
     """Look a profile up in the manifests of batches.
 
@@ -106,6 +109,7 @@ def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
         Folders that batches wrote, or their manifests.
     """
     from xosc_lateral.files.profiles import profile_hash, read_profile
+    from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
 
     now: str | None
     try:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.result import (
     DrivesLike,
     GivenDrives,
@@ -24,41 +24,38 @@ from xosc_lateral.workflows.result import (
 if TYPE_CHECKING:
     from xosc_lateral.drivers.loop.close import LoopResult
     from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
+@declare_options
 def close_loop(
     drives: DrivesLike,
-    profile: ProfileLike | None = None,
+    profile: Annotated[ProfileLike | None, flag("--profile", "-p", kind=str | None, metavar="NAME|PATH",
+        help="Profile to start from; default: one is fitted.")] = None,
     *,
     seed: int = 0,
     name: str = "refined",
-    leave_out: Collection[str] = (),
-    roles: Mapping[str, str] | None = None,
+    leave_out: Annotated[Collection[str], flag(kind=list[str] | None, metavar="COLUMN",
+        help="Context column to ignore; may be repeated.")] = (),
+    roles: Annotated[Mapping[str, str] | None, flag("--role", kind=list[str] | None, read=texts, metavar="COLUMN=ROLE",
+        help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     progress: Callable[[float, str], None] | None = None,
-) -> ClosedLoop:
+) -> ClosedLoop:  # fmt: skip
     """Find what measured drives do and a profile doesn't, trace it to an effect, add it, score it held out.
 
     Parameters
     ----------
     drives, columns
         See `read_drives`.
-    profile : DriverProfile, path or name, optional
-        To start from; without, one is fitted first.
-    seed : int
-        Same inputs and seed: same result.
     name : str
         Of the refined profile.
-    leave_out : collection of str
-        Columns not to look at.
     roles : mapping of str to str, optional
         What columns are: column -> road, weather, traffic, time, own, driver or unknown. Road, weather and traffic are
         never dismissed as consequences of the car's movement, own movement and time are never causes. Default: what a
         mapping file says in `[roles]`, then by name and values.
-    library : path or paths
-        Folders with further profiles.
     progress : callable, optional
         Told the share that is done, 0 to 1, and what is being done.
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file, output_folder
+from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
 
 if TYPE_CHECKING:
@@ -20,7 +21,18 @@ if TYPE_CHECKING:
 
 PROFILE_SUFFIXES = (".json",)
 
+TAGS = flag("--tag", kind=list[str] | None, metavar="TAG", help="Tag to add; may be repeated.")
 
+METADATA = flag(
+    "--set",
+    kind=list[str] | None,
+    read=texts,
+    metavar="FIELD=VALUE",
+    help="Metadata: version, driver, vehicle, road, country, date or licence.",
+)
+
+
+@declare_options
 def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
     """Read a profile by its path or its name.
 
@@ -58,11 +70,14 @@ def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -
     return write_page(path, f"{profile.name}.html", lambda: card_page(profile), force=force)
 
 
+@declare_options
 def derive_profile(
     base: ProfileLike = "motorway",
     *,
-    name: str = "",
-    preset: str | None = None,
+    name: Annotated[str, flag(help="Id of the new profile.")] = "",
+    preset: Annotated[
+        str | None, flag(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
+    ] = None,
     library: Paths = (),
     **asked: float | str | None,
 ) -> Derived:
@@ -77,19 +92,14 @@ def derive_profile(
         Gives what is not stated; of a population its typical driver.
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
-    preset : str, optional
-        One of `fitting.stated_figures.PRESETS`: figures with a source.
-    library : path or paths
-        Folders with further profiles.
     **asked
-        Fields of `fitting.stated_figures.Asked`: ``sdlp=0.25``.
+        Fields of `fitting.derive.Asked`: ``sdlp=0.25``.
     """
     from dataclasses import replace
 
     from msgspec import structs
 
-    from xosc_lateral.drivers.fitting.derive import derive
-    from xosc_lateral.drivers.fitting.stated_figures import Asked, preset_called
+    from xosc_lateral.drivers.fitting.derive import Asked, derive, preset_called
     from xosc_lateral.files.profiles import profile_hash
 
     known = given_profile(base, library)
@@ -102,21 +112,17 @@ def derive_profile(
     return made._replace(profile=structs.replace(made.profile, provenance=origin))
 
 
+@declare_options
 def list_profiles(
-    library: Paths = (), *, tags: Collection[str] = (), where: Mapping[str, str] | None = None
-) -> ProfileList:
+    library: Paths = (), *,
+    tags: Annotated[Collection[str], flag("--tag", kind=list[str] | None, metavar="TAG",
+        help="Only profiles with this tag; may be repeated.")] = (),
+    where: Annotated[Mapping[str, str] | None, flag(kind=list[str] | None, read=texts, metavar="FIELD=VALUE",
+        help="Only profiles with this value, e.g. country=DE; may be repeated.")] = None,
+) -> ProfileList:  # fmt: skip
     """Everything in the library: `library`, the environment's and the configuration's folders, shipped, plug-ins'.
 
     A file that is no valid profile is listed with what is wrong with it.
-
-    Parameters
-    ----------
-    library : path or paths
-        Folders with further profiles.
-    tags : collection of str
-        List only profiles that carry all of them.
-    where : mapping of str to str, optional
-        List only profiles with this metadata: ``{"country": "DE"}``.
     """
     from xosc_lateral.files.profiles import matching, read_library
 
@@ -124,32 +130,19 @@ def list_profiles(
     return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
 
 
+@declare_options
 def add_profile(
     profile: ProfileLike,
-    library: PathLike,
-    *,
-    name: str | None = None,
-    tags: Collection[str] = (),
-    metadata: Mapping[str, str] | None = None,
+    library: Annotated[PathLike, flag(kind=Path, metavar="FOLDER",
+        help="Folder of the library; created if missing.")], *,
+    name: Annotated[str | None, flag("--name", help="Id in the library; default: its own.")] = None,
+    tags: Annotated[Collection[str], TAGS] = (),
+    metadata: Annotated[Mapping[str, str] | None, METADATA] = None,
     force: bool = False,
-) -> Path:
+) -> Path:  # fmt: skip
     """Put a profile into a library's folder, under its id, with tags and metadata.
 
     Raises `FormatError`: There is a profile of that id.
-
-    Parameters
-    ----------
-    profile : DriverProfile, path or name
-    library : str or Path
-        Folder; made if it is missing.
-    name : str, optional
-        Its id there; else the one that it has.
-    tags : collection of str
-        Added to those that it has.
-    metadata : mapping of str to str, optional
-        `version`, `driver`, `vehicle`, `road`, `country`, `date`, `licence`.
-    force : bool
-        Replace a profile of that id.
     """
     from xosc_lateral.files import profiles
     from xosc_lateral.files.profiles import described
@@ -163,13 +156,16 @@ def add_profile(
     return output
 
 
+@declare_options
 def tag_profile(
     name: PathLike,
     library: Paths = (),
     *,
-    add: Collection[str] = (),
-    remove: Collection[str] = (),
-    metadata: Mapping[str, str] | None = None,
+    add: Annotated[Collection[str], TAGS] = (),
+    remove: Annotated[
+        Collection[str], flag(kind=list[str] | None, metavar="TAG", help="Tag to remove; may be repeated.")
+    ] = (),
+    metadata: Annotated[Mapping[str, str] | None, METADATA] = None,
 ) -> DriverProfile:
     """Change tags and metadata of a profile in its file.
 
@@ -186,7 +182,8 @@ def tag_profile(
     return changed
 
 
-def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ()) -> ProfileComparison:
+@declare_options
+def compare_profiles(*profiles: ProfileLike, library: Paths = (), seed: int = 0) -> ProfileComparison:
     """How profiles differ in even traffic: a summary of each, and the distance of each from each.
 
     Parameters
@@ -195,8 +192,6 @@ def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ())
         Two or more.
     seed : int
         Of the free runs that are compared.
-    library : path or paths
-        Folders with further profiles.
     """
     from xosc_lateral.drivers.evaluation.profile_comparison import compare
 

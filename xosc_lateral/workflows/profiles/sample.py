@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.drives.cleaning import RUN
-from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
     GivenDrives,
@@ -26,42 +25,36 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.sampled_offsets import SampledOffsets
+    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
+@declare_options
 def sample(
-    profile: ProfileLike,
-    *,
-    like: DrivesLike | None = None,
-    context: DrivesLike | None = None,
-    duration: float | None = None,
+    profile: Annotated[ProfileLike, PROFILE], *,
     seed: int = 0,
-    snippet: float = 10.0,
-    speed: float = 30.0,
-    lane_width: float | None = None,
+    like: Annotated[DrivesLike | None, flag(kind=list[Path] | None, metavar="TABLE",
+        help="For each measured snippet, one with the same start and context.")] = None,
+    snippet: Annotated[float, flag(help="Length of a snippet with --like. [s]", min=0.2, max=1e6)] = 10.0,
+    context: Annotated[DrivesLike | None, flag(kind=list[Path] | None, metavar="TABLE",
+        help="One free run per drive of the table, under its context.")] = None,
+    duration: Annotated[float | None, flag(help="One free run of this length. [s]", min=0.2, max=9e6)] = None,
+    speed: Annotated[float, flag(help="Speed of the free run. [m/s]", min=0, max=150)] = 30.0,
+    lane_width: Annotated[float | None, flag(help="Lane width of the free run [m]; default: the profile's.", min=1,
+        max=10)] = None,
     with_sensor: bool = False,
     columns: MappingLike | None = None,
     library: Paths = (),
-) -> Offsets:
+) -> Offsets:  # fmt: skip
     """Sample offsets; one of `like`, `context` and `duration` says for what.
 
     Parameters
     ----------
     profile : DriverProfile, path or name
-    like : drives, optional
-        For each measured snippet of `snippet` seconds one of the same length, start and context.
-    context : drives, optional
-        One free run per drive, under its context.
-    duration : float, optional
-        One free run of this length, at constant `speed` [m/s] in lanes of `lane_width` (the profile's). [s]
-    with_sensor : bool
-        Add what the sensor added to the drives that the profile was fitted on, for tests of a perception chain.
-    seed : int
-        Same inputs and seed: same offsets.
     columns : mapping of str to str, TableMapping, or path, optional
         See `read_drives`.
-    library : path or paths
-        Folders with further profiles.
+    with_sensor : bool
+        Add what the sensor added to the drives that the profile was fitted on, for tests of a perception chain.
     """
     from xosc_lateral.drivers.model.sampled_offsets import sample_context, sample_free, sample_like
 
@@ -140,6 +133,8 @@ class Offsets(Result):
         `snippet` and `offset_real` [m]. `following_run` counts what is cut apart: the table can be fitted as it is.
         """
         import numpy as np
+
+        from xosc_lateral.drivers.drives.cleaning import RUN
 
         lengths = [len(each.time) for each in self._made]
         numbers = np.repeat(np.arange(len(lengths)), lengths)

@@ -29,8 +29,8 @@ from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
-from xosc_lateral.workflows.conversion.options import spelled_out, values_of
 from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
+from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
@@ -51,8 +51,6 @@ def reconstruct(
     recording: PathLike,
     output: PathLike | None = None,
     *,
-    format: str | None = None,  # noqa: A002 (as in `import_drives`)
-    road: PathLike | None = None,
     columns: MappingLike | None = None,
     force: bool = False,
     **options: Unpack[ReconstructKeywords],
@@ -65,10 +63,6 @@ def reconstruct(
         Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
     output : str or Path, optional
         Folder to write to, see `Reconstruction.write`; without it nothing is written.
-    format : str, optional
-        "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; without it, told from the file.
-    road : str or Path, optional
-        OpenDRIVE file, for recordings that come without their lanes; SUMO's network, for its FCD output.
     columns : dict, path or TableMapping, optional
         Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
     force : bool
@@ -81,7 +75,7 @@ def reconstruct(
     FormatError, NotEnoughDataError
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=format, road=None if road is None else Path(road), columns=columns)
+    traffic = read_recording(Path(recording), kind=settings.format, road=settings.road, columns=columns)
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)

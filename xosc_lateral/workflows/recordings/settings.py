@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
-from xosc_lateral.workflows.conversion import options as say
-from xosc_lateral.workflows.conversion.options import Paths, option
+from xosc_lateral.workflows import options as say
+from xosc_lateral.workflows.options import PathLike, Paths, option
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")  # of the standard, that can be written
 
@@ -23,12 +23,24 @@ def _version(text: str) -> str:
 class ReconstructSettings:
     """What is reconstructed, and how: keywords of `reconstruct`, and the options of the command line.
 
+    `format`: "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; by default told from the file. `road`: of
+    recordings that come without their lanes. `begin`, `end`: part of the recording. [s] `vehicles`: these alone.
     `around`, `window`: a vehicle and those who come near it, for so long in the middle of its passage. [s] `host`:
-    `convert` leaves it to the system that drives it. `relative`: where the recording bears it out. `fit`: a profile of
-    its own for every vehicle that drove long enough. `library`: folders with further profiles to choose from.
+    the vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own,
+    "none": there is none. `error`: positions along the road are within this; smaller: more corners in the speeds.
+    [m] `version`: of OpenSCENARIO, "1.0" to "1.3". `relative`: lane changes and braking begin at a distance to
+    another vehicle, where the recording bears it out. `exact`: recorded paths as trajectories, instead of
+    maneuvers. `fit`: a driver profile of its own for every vehicle that drove long enough. `library`: folders with
+    further profiles to choose from.
     """
 
     # fmt: off
+    format: str | None = option(
+        None, str, kind=str | None, show_default=False,
+        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.")
+    road: Path | None = option(
+        None, Path, kind=Path | None, show_default=False,
+        help="OpenDRIVE file, or SUMO network, that it was recorded on.")
     begin: float | None = option(None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].")
     end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
     vehicles: frozenset[str] | None = option(
@@ -55,6 +67,8 @@ class ReconstructSettings:
 class ReconstructKeywords(TypedDict, total=False):
     """The same names for type checkers, with what a call may be given."""
 
+    format: str | None
+    road: PathLike | None
     begin: float | None
     end: float | None
     vehicles: Collection[str] | None

@@ -23,7 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.world.motion.deviation import smoother_step
+from xosc_lateral.world.motion.trajectory import smoother_step
 
 GRID = 0.1
 """Between places where a move may begin or end: above 5 Hz nobody steers. [s]"""

@@ -76,14 +76,9 @@ def travel(state: EntityState, way: int, distance: float) -> None:
         state._pose = None
         state.at_road_end = False
         return
-    _travel_far(state, way, distance)
-
-
-def _travel_far(state: EntityState, way: int, distance: float) -> None:
-    network = state.network
     links_passed = 0
     while True:
-        moved = network.advance(
+        moved = state.network.advance(
             state.road, state.lane, state.s, distance, direction=way, choose=lambda options: _choose(state, options)
         )
         if moved.direction != way:

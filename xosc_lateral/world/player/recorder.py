@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.errors import FormatError, PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
@@ -50,7 +50,7 @@ class Rows:
         self._road = array("i")
         self._lane = array("i")
         self._activity = array("B")
-        self._columns = (
+        self._columns: tuple[array[Any], ...] = (
             self._s, self._offset_t, self._relative_heading, self._speed, self._road, self._lane, self._activity
         )  # fmt: skip
         self._put_away: list[NDArray[np.uint8]] = []
@@ -85,27 +85,16 @@ class Rows:
 
     def follow(self, s: FloatArray) -> None:
         """Write down rows along a lane that differ in s alone, shape (n,). [m]"""
-        state, n = self.state, len(s)
+        state = self.state
         self._s.frombytes(s.tobytes())
-        for column, value in (
-            (self._road, state.road),
-            (self._lane, state.lane),
-            (self._offset_t, state.offset_t),
-            (self._relative_heading, state.relative_heading),
-            (self._speed, state.speed),
-            (self._activity, state.activity),
-        ):
-            column.frombytes(np.full(n, value, dtype=column.typecode).tobytes())
+        same = state.offset_t, state.relative_heading, state.speed, state.road, state.lane, state.activity
+        for column, value in zip(self._columns[1:], same, strict=True):
+            column.frombytes(np.full(len(s), value, dtype=column.typecode).tobytes())
 
-    def _implausible(self, time: float, what: str) -> PlaybackError:
-        place = self.state.entity.place
-        return PlaybackError(
-            f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; limits "
-            f"{MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s): the scenario can't be played",
-            path=place.path,
-            line=place.line,
-            element=place.element,
-        )
+    def _implausible(self, time: float, what: str) -> FormatError:
+        limits = f"limits {MAXIMUM_COORDINATE:g} m and {MAXIMUM_SPEED:g} m/s"
+        where = f"'{self.state.name}' leaves every plausible bound at {time:.2f} s ({what}; {limits})"
+        return self.state.entity.place.error(f"{where}: the scenario can't be played", PlaybackError)
 
     def put_away(self) -> None:
         """Make place for rows to come."""
@@ -124,15 +113,10 @@ class Rows:
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel; what was written down is gone."""
         self.put_away()
-        names = (
-            "x", "y", "z", "heading", "pitch", "roll",
-            "speed", "road", "lane", "s", "offset", "heading_relative", "activity",
-        )  # fmt: skip
-        worked_out = columns(len(time), self._worked_out(network, time))
-        return EntityMotion(entity=self.state.entity, time=time, **dict(zip(names, worked_out, strict=True)))
+        return EntityMotion(self.state.entity, time, *columns(len(time), self._worked_out(network, time)))
 
     def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
-        """Columns of `motion`, in blocks of rows."""
+        """Columns of `EntityMotion` from x on, in blocks of rows."""
         begin, before = 0, tuple[NDArray[Any], ...]()
         for s, offset, along, speed, road, lane, activity in self._blocks():
             n, where = len(s), _Where(road, lane, s, offset)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import isnan
 from typing import Any
@@ -22,7 +22,7 @@ from xosc_lateral.world.road.geometry import Arc, Line
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import DrivingControllers
 from xosc_lateral.world.scenario.place import Place
-from xosc_lateral.world.scenario.scenario import Action, Scenario, TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.world.scenario.scenario import Scenario, TrafficSignalController, TrafficSignalPhase
 
 
 @dataclass
@@ -184,16 +184,6 @@ class Simulation:
             return None
         date_time, goes_on, set_at = self.time_of_day
         return date_time + timedelta(seconds=self.time - set_at) if goes_on else date_time
-
-    # ---- what was played ---------------------------------------------------------------------------------------------
-    def record_start(self, action: Action, actor: str | None, path: tuple[str, ...]) -> int:
-        """Note the start of an action; returns the number under which to note its end."""
-        self.played.append(PlayedAction(action, actor, path, self.time, None))
-        return len(self.played) - 1
-
-    def record_end(self, number: int) -> None:
-        """Note the end of an action."""
-        self.played[number] = replace(self.played[number], end=self.stamp)
 
 
 # ---- entities that only follow their lanes and that nobody looks at: many frames at once, with the same numbers ----

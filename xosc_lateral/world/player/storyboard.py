@@ -42,7 +42,6 @@ class StoryboardElement:
     """None: its parent has not started it."""
     count: int = field(default=0, init=False)
     parent: StoryboardElement | None = field(default=None, init=False, repr=False)
-    path: tuple[str, ...] = field(default=(), init=False)
     watchers: list[Watcher] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -56,11 +55,11 @@ class StoryboardElement:
         return self.state is _RUNNING
 
     # ---- the tree ----------------------------------------------------------------------------------------------------
-    def settle(self, path: tuple[str, ...] = ()) -> None:
-        """Tell the whole tree its paths (names from the story down)."""
-        self.path = (*path, self.name) if self.kind is not None else ()
-        for child in self.children:
-            child.settle(self.path)
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Names from the story down."""
+        above = () if self.parent is None else self.parent.path
+        return above if self.kind is None else (*above, self.name)
 
     def walk(self) -> Iterator[StoryboardElement]:
         """This element and all under it, parents first."""

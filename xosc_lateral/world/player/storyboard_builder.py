@@ -50,7 +50,6 @@ def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> Storyboa
         for story in storyboard.stories
     ]
     root = StoryboardElement("", None, stories, stop_trigger=_trigger(storyboard.stop_trigger, simulation))
-    root.settle()
     for look in simulation.when_built:
         look(root)
     if storyboard.stop_trigger is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from operator import eq, ge, gt, le, lt, ne
 
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
@@ -12,14 +11,6 @@ from xosc_lateral.world.scenario.scenario import Parameter
 
 Value = bool | float | int | str
 
-_EXACT_COMPARISONS = {
-    Rule.EQUAL_TO: eq,
-    Rule.GREATER_THAN: gt,
-    Rule.LESS_THAN: lt,
-    Rule.GREATER_OR_EQUAL: ge,
-    Rule.LESS_OR_EQUAL: le,
-    Rule.NOT_EQUAL_TO: ne,
-}
 _INTEGER_TYPES = frozenset({ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType.UNSIGNED_SHORT})
 
 
@@ -37,11 +28,6 @@ def holds(left: float, rule: Rule, right: float) -> bool:
     if rule is Rule.LESS_OR_EQUAL:
         return beyond <= EPSILON
     return (abs(beyond) < EPSILON) is (rule is Rule.EQUAL_TO)
-
-
-def holds_exactly(left: Value, rule: Rule, right: Value) -> bool:
-    """Compare whole numbers, truth values and texts."""
-    return bool(_EXACT_COMPARISONS[rule](left, right))
 
 
 class Values:
@@ -81,7 +67,7 @@ class Values:
             return holds(value, rule, other)
         if isinstance(value, str) != isinstance(other, str):
             value, other = str(value), str(other)
-        return holds_exactly(value, rule, other)
+        return rule.holds(value, other)
 
 
 def _read(text: str, kind: ParameterType) -> Value:

@@ -49,15 +49,12 @@ class LaneTables:
         ids = [lane.id for lane in self._lanes]
         self._lowest = min(ids, default=0)  # a file may hold no road at all
         self._slots = max(ids, default=0) - self._lowest + 1
-        self._rows = np.full(len(sections) * self._slots, -1, dtype=np.intp)
-        row = 0
-        self._section_first = np.empty(len(sections), dtype=np.intp)
         self._section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
-        for i, section in enumerate(sections):
-            self._section_first[i] = row
-            for lane in (*section.lanes, section.centre):
-                self._rows[i * self._slots + lane.id - self._lowest] = row
-                row += 1
+        lanes = self._section_count + 1  # lane 0 is the last of its section
+        self._section_first = np.cumsum(lanes, dtype=np.intp) - lanes
+        self._rows = np.full(len(sections) * self._slots, -1, dtype=np.intp)
+        slot = np.repeat(np.arange(len(sections)), lanes) * self._slots + np.array(ids, dtype=np.intp) - self._lowest
+        self._rows[slot] = np.arange(len(ids))
         self._lane_ids = np.array(ids, dtype=np.int32)
         self._lane_directions = np.array([lane.direction for lane in self._lanes], dtype=np.int32)
         self._lane_lookup = Lookup([lane.starts for lane in self._lanes])

@@ -31,9 +31,12 @@ MINIMUM_LANE_WIDTH = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
-def beside(lane: int, step: int) -> int:
-    """Id of the lane on the left (+1) or right (-1), looking along s; lane 0 is none."""
-    return lane + step if lane + step else lane + 2 * step
+def beside(lane: int, lanes: int) -> int:
+    """Id of the lane so many further along +t; there is no lane 0 to drive on."""
+    target = lane + lanes
+    if lane != 0 and (target == 0 or (target > 0) != (lane > 0)):
+        target += 1 if lanes > 0 else -1
+    return target
 
 
 class LaneFacts(Struct, frozen=True):

@@ -51,7 +51,14 @@ class Links:
         if other is None:
             return
         contact = link.contact or self._contact_of(road, direction, other)
-        for target in self._linked_ids(here, lane_here, direction, self.roads[other], contact):
+        # as the lane says, else as the other side says
+        ids = lane_here.successors if direction > 0 else lane_here.predecessors
+        there = _end_section(self.roads[other], contact).by_id
+        if ids:
+            targets = [target for target in ids if target in there and target != 0]
+        else:
+            targets = _lanes_linked_to(here, lane_here, direction, self.roads[other], contact)
+        for target in targets:
             yield self._enter(other, target, contact)
 
     def _through_junction(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
@@ -61,7 +68,10 @@ class Links:
             if connection.incoming_road != here.id or other is None:
                 continue
             contact = connection.contact or "start"
-            for target in self._connected_ids(connection, here, lane, direction, self.roads[other], contact):
+            targets = [to for source, to in connection.lanes if source == lane.id]
+            if not connection.lanes:  # those that name the lane as their own link
+                targets = _lanes_linked_to(here, lane, direction, self.roads[other], contact)
+            for target in targets:
                 if target in _end_section(self.roads[other], contact).by_id:
                     yield self._enter(other, target, contact)
 
@@ -93,21 +103,6 @@ class Links:
             for back, contact in ((incoming.successor, "end"), (incoming.predecessor, "start")):
                 if back and back.element_type == "junction" and back.element_id == link.element_id:
                     yield connection, other, contact
-
-    def _connected_ids(
-        self, connection: Connection, here: Road, lane: Lane, direction: int, other: Road, contact: str
-    ) -> list[int]:
-        """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
-        if connection.lanes:
-            return [to for source, to in connection.lanes if source == lane.id]
-        return _lanes_linked_to(here, lane, direction, other, contact)
-
-    def _linked_ids(self, here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
-        """Lanes of the linked road: as the lane says, else as the other side says."""
-        ids = lane.successors if direction > 0 else lane.predecessors
-        if ids:
-            return [i for i in ids if i in _end_section(other, contact).by_id and i != 0]
-        return _lanes_linked_to(here, lane, direction, other, contact)
 
     def _contact_of(self, road: int, direction: int, other: int) -> str:
         """Contact point that a file leaves out: the end of the other road that is nearer."""

@@ -127,7 +127,6 @@ class RoadNetwork(SurfaceIndex, Routes):
         x: float,
         y: float,
         z: float | None = None,
-        heading: float | None = None,
         *,
         near: tuple[int, float] | None = None,
         lane_types: Collection[str] | None = DRIVING,
@@ -137,13 +136,13 @@ class RoadNetwork(SurfaceIndex, Routes):
         `near` = (road, s) where it was a moment ago makes it cheap, and distinguishes roads that lie on each other.
         """
         if near is None or near[0] < 0:
-            return self._nearest_lane(x, y, z, heading, lane_types)
+            return self._nearest_lane(x, y, z, lane_types)
         before, s = near
         s, t, ahead = project_at(self.roads[before], x, y, s)
         here = lane_at(self.roads[before], before, s, t, lane_types)
         if _is_on(here, ahead):
             return here
-        located = self._nearest_lane(x, y, z, heading, lane_types)
+        located = self._nearest_lane(x, y, z, lane_types)
         if located.road == before or located.distance > LANE_TOLERANCE:
             return located
         # At the entry of a junction its roads lie on each other, and a point that is between two vertices of a path has
@@ -157,10 +156,8 @@ class RoadNetwork(SurfaceIndex, Routes):
                 return onward
         return located
 
-    def _nearest_lane(
-        self, x: float, y: float, z: float | None, heading: float | None, lane_types: Collection[str] | None
-    ) -> LaneCoordinates:
-        best = self.world_to_lane(x, y, z, heading, lane_types=lane_types)
+    def _nearest_lane(self, x: float, y: float, z: float | None, lane_types: Collection[str] | None) -> LaneCoordinates:
+        best = self.world_to_lane(x, y, z, lane_types=lane_types)
         return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
 
     # ---- to be seen --------------------------------------------------------------------------------------------------

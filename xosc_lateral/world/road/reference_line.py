@@ -8,25 +8,21 @@ The series of a clothoid about its middle is derived in docs/design/clothoids.md
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
-from collections.abc import Sequence
-from typing import NamedTuple
-
 from xosc_lateral.world.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
 from xosc_lateral.world.road.road import Road
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 
 class Frame(NamedTuple):
@@ -189,13 +185,13 @@ def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[Refe
     u, v = _bin_middles(along, across, forward)
     line = _smooth(u, v, KNOT_SPACING)
     fine = np.arange(along.min() - 50.0, along.max() + 50.0, 0.5)
-    curve = _straight_outside(line, u, fine)
+    inside = np.clip(fine, u[0], u[-1])
+    curve = line(inside) + line.derivative()(inside) * (fine - inside)  # straight beyond both ends
     s_fine = np.r_[0.0, np.cumsum(np.hypot(np.diff(fine), np.diff(curve)))]
     rotation = np.array([axis, [-axis[1], axis[0]]])
     places = CubicSpline(s_fine, np.column_stack([fine, curve]) @ rotation + middle)
     slow = _smooth(u, v, CURVATURE_KNOT_SPACING)
-    u_inside = np.clip(fine, u[0], u[-1])
-    bend = slow.derivative(2)(u_inside) / (1.0 + slow.derivative(1)(u_inside) ** 2) ** 1.5
+    bend = slow.derivative(2)(inside) / (1.0 + slow.derivative(1)(inside) ** 2) ** 1.5
 
     reference = ReferenceLine(
         length=float(s_fine[-1]),
@@ -233,10 +229,3 @@ def _smooth(u: FloatArray, v: FloatArray, spacing: float) -> BSpline[np.float64]
 
     inner = np.linspace(u[0], u[-1], max(2, round((u[-1] - u[0]) / spacing) + 1))[1:-1]
     return make_lsq_spline(u, v, np.r_[[u[0]] * 4, inner, [u[-1]] * 4], 3)
-
-
-def _straight_outside(line: BSpline[np.float64], u: FloatArray, at: FloatArray) -> FloatArray:
-    """The line at `at`, continued straight beyond both ends of `u`."""
-    inside = np.clip(at, u[0], u[-1])
-    values: FloatArray = line(inside) + line.derivative()(inside) * (at - inside)
-    return values

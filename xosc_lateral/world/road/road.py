@@ -15,7 +15,7 @@ from math import asin, atan, atan2, ceil, cos, inf, nan, pi, sin
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.geometry import Line, ReferenceElement
 from xosc_lateral.world.road.lanes import Lane, LaneSection
-from xosc_lateral.world.road.positions import LaneCoordinates, Pose
+from xosc_lateral.world.road.positions import TWO_PI, LaneCoordinates, Pose
 from xosc_lateral.world.road.surface import Surface
 
 
@@ -117,7 +117,6 @@ class Road:
 # ---- one place at a time, in plain floats: what the player asks for in every frame ----
 # Derived here: the surface's axes are the reference line's, turned by its pitch and then by its roll; heading, pitch
 # and roll of a vehicle follow from the axes that its own heading gives within that surface.
-TWO_PI = 2.0 * pi
 
 
 def normal_angle(angle: float) -> float:

@@ -9,12 +9,9 @@ from enum import IntFlag
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.world.scenario.entity import Controller
-from xosc_lateral.world.scenario.private_actions import (
-    ActivateControllerAction,
-    AssignControllerAction,
-    OverrideControllerValueAction,
-)
+from xosc_lateral.world.scenario import private_actions
+from xosc_lateral.world.scenario.entity import Controller, Entity
+from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 
 class Domains(IntFlag):
@@ -27,10 +24,7 @@ class Domains(IntFlag):
 
     def words(self) -> str:
         """In words."""
-        return _WORDS[int(self)]
-
-
-_WORDS = ("nothing", "along the road", "across the road", "along and across the road")
+        return ("nothing", "along the road", "across the road", "along and across the road")[self]
 
 
 class ControllerKind(Struct, frozen=True):
@@ -117,14 +111,14 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     """Domains that an action switches on or off; to override pedals or the wheel is to drive, too."""
     switched: tuple[tuple[Domains, bool | None], ...] = ()
     match content:
-        case AssignControllerAction():
+        case private_actions.AssignControllerAction():
             switched = (
                 (Domains.LONGITUDINAL, content.activate_longitudinal),
                 (Domains.LATERAL, content.activate_lateral),
             )
-        case ActivateControllerAction():
+        case private_actions.ActivateControllerAction():
             switched = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
-        case OverrideControllerValueAction():
+        case private_actions.OverrideControllerValueAction():
             switched = tuple(
                 (Domains.LATERAL if "steering" in name.lower() else Domains.LONGITUDINAL, active)
                 for name, active, _ in content.overrides
@@ -135,7 +129,7 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
 def gives_lateral(content: object) -> bool | None:
     """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
     lateral = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
-    if isinstance(content, AssignControllerAction) and content.controller is not None:
+    if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
         kind = kind_of(content.controller)
         return Domains.LATERAL in kind.drives if kind.at_once else lateral
     return lateral
@@ -143,7 +137,7 @@ def gives_lateral(content: object) -> bool | None:
 
 def is_meant(controller: Controller, content: object) -> bool:
     """Whether an activation may be of this controller: it names it, or none."""
-    name = content.controller_ref if isinstance(content, ActivateControllerAction) else None
+    name = content.controller_ref if isinstance(content, private_actions.ActivateControllerAction) else None
     return not name or name in (controller.object_name, controller.name)
 
 
@@ -166,14 +160,14 @@ class DrivingControllers:
 
     def follow(self, content: object) -> None:
         """An action on controllers has begun."""
-        if isinstance(content, AssignControllerAction) and content.controller is not None:
+        if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
             self._assign(content.controller)
-        if isinstance(content, OverrideControllerValueAction):
+        if isinstance(content, private_actions.OverrideControllerValueAction):
             self._overridden = Domains.NONE
             for domain, on in switches(content):
                 self._overridden |= domain if on else Domains.NONE
             return
-        if self._for_carla and isinstance(content, ActivateControllerAction):
+        if self._for_carla and isinstance(content, private_actions.ActivateControllerAction):
             self._assigned = [assigned for assigned in self._assigned if assigned.kind is not AUTOPILOT]
             self._assigned.append(_Assigned(Controller(AUTOPILOT.name, content.place), AUTOPILOT))
         meant = next((each for each in reversed(self._assigned) if is_meant(each.controller, content)), None)
@@ -209,3 +203,97 @@ def named(controller: Controller) -> str:
     """By its own name, and as its player calls it."""
     kind = kind_of(controller).name
     return f"'{controller.name}'" + ("" if kind.lower() == controller.name.strip().lower() else f" ({kind})")
+
+
+# ---- vehicles that the storyboard does not drive: those under test, and those that a controller has ----
+EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
+    # CARLA's ScenarioRunner, openscenario_configuration.py: ego vehicles are those of this type.
+    "type": frozenset({"ego_vehicle"}),
+}
+"""Property of a vehicle -> values that leave it to somebody else; both in lower case."""
+
+EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
+"""Names by which CARLA's tools look for the vehicle that they drive (its `role_name`)."""
+
+
+def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
+    """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
+    assigned = assigned_controllers(scenario)
+    egos = {}
+    for entity in scenario.entities:
+        why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
+        if why:
+            egos[entity.name] = why
+    return egos
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Controllers that drive an entity at some time: their names, and the domains that they have then."""
+
+    controllers: tuple[str, ...]
+    domains: Domains
+
+    def __str__(self) -> str:
+        return f"{' and '.join(self.controllers)}: {self.domains.words()}"
+
+
+def controlled_entities(scenario: Scenario) -> dict[str, Control]:
+    """Entities that controllers drive at some time, by an action that makes them active, in the scenario's order."""
+    assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
+    for actors, action in _private_actions(scenario):
+        for actor in actors if isinstance(action.content, private_actions.CONTROLLER) else ():
+            actions.setdefault(actor, []).append(action.content)
+    reasons = {}
+    for entity in scenario.entities:
+        names, domains = dict[str, None](), Domains.NONE
+        contents = actions.get(entity.name, [])
+        for controller in assigned[entity.name]:
+            kind = kind_of(controller)
+            asked = Domains.BOTH if kind.at_once else Domains.NONE
+            for domain in _switched_on(content for content in contents if is_meant(controller, content)):
+                asked |= domain
+            if kind.active(asked):
+                names[named(controller)] = None
+                domains |= kind.active(asked)
+        activations = (content for content in contents if isinstance(content, private_actions.ActivateControllerAction))
+        if scenario.header.is_left_handed and any(_switched_on(activations)):
+            names[AUTOPILOT.name] = None
+            domains = Domains.BOTH
+        if domains:
+            reasons[entity.name] = Control(tuple(names), domains)
+    return reasons
+
+
+def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:
+    return (domain for content in contents for domain, on in switches(content) if on)
+
+
+def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
+    """Controllers of each entity, from the start or later."""
+    assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
+    for actors, action in _private_actions(scenario):
+        content = action.content
+        if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
+            for actor in actors:
+                assigned.setdefault(actor, []).append(content.controller)
+    return assigned
+
+
+def _why(entity: Entity, controllers: Iterable[Controller]) -> str:
+    for controller in controllers:
+        if kind_of(controller).is_external:
+            return f"controller {named(controller)}"
+    for name, value in entity.properties.items():
+        if value.strip().lower() in EXTERNAL_ENTITIES.get(name.strip().lower(), ()):
+            return f"{name} {value}"
+    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
+
+
+def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
+    for private in scenario.storyboard.init.privates:
+        for action in private.actions:
+            yield (private.entity_ref,), action
+    for at in scenario.storyboard.events():
+        for action in at.event.actions:
+            yield at.actors, action

@@ -7,34 +7,29 @@ event that moves it or an action that refers to somebody. In doubt a thing depen
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario.conditions import (
-    CollisionCondition,
-    ParameterCondition,
-    RelativeClearanceCondition,
-    StoryboardElementStateCondition,
-    TrafficSignalCondition,
-    TrafficSignalControllerCondition,
-    UserDefinedValueCondition,
-    VariableCondition,
-)
-from xosc_lateral.world.scenario.controllers import AUTOPILOT, Domains, is_meant, kind_of, named, switches
-from xosc_lateral.world.scenario.entity import Controller, Entity
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.world.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
 from xosc_lateral.world.scenario.private_actions import (
     APPEARANCE,
-    CONTROLLER,
-    ActivateControllerAction,
-    AssignControllerAction,
     TeleportAction,
 )
-from xosc_lateral.world.scenario.scenario import Act, Action, Condition, Event, ManeuverGroup, Scenario, Trigger
+from xosc_lateral.world.scenario.scenario import (
+    Act,
+    Condition,
+    Event,
+    ManeuverGroup,
+    Scenario,
+    Trigger,
+    actors_of,
+    conditions_of,
+)
 
 Path = tuple[str, ...]
 
@@ -75,16 +70,16 @@ class Dependence:
         if looked_at & self.entities:
             return True
         match content:
-            case CollisionCondition(entity_ref=None) | RelativeClearanceCondition(entity_refs=()):
+            case conditions.CollisionCondition(entity_ref=None) | conditions.RelativeClearanceCondition(entity_refs=()):
                 return bool(self.entities)  # anybody
-            case StoryboardElementStateCondition():
+            case conditions.StoryboardElementStateCondition():
                 paths = self.begins if content.state is StoryboardElementState.START_TRANSITION else self.ends
                 return any(refers_to(content, path) for path in paths)
-            case ParameterCondition() | VariableCondition() | TrafficSignalCondition():
+            case conditions.ParameterCondition() | conditions.VariableCondition() | conditions.TrafficSignalCondition():
                 return _value(content) in self.values
-            case TrafficSignalControllerCondition():
+            case conditions.TrafficSignalControllerCondition():
                 return content.controller_ref in self.values
-        return isinstance(content, UserDefinedValueCondition)  # comes from whoever drives
+        return isinstance(content, conditions.UserDefinedValueCondition)  # comes from whoever drives
 
     def size(self) -> int:
         """Of what was found."""
@@ -99,7 +94,12 @@ def dependence(scenario: Scenario, unforeseeable: Collection[str]) -> Dependence
     size = -1
     while result.size() != size:
         size = result.size()
-        _follow_init(scenario, result)
+        for private in scenario.storyboard.init.privates:
+            for action in private.actions:  # where others are at the start is known
+                if not isinstance(action.content, TeleportAction) and result.entities & set(
+                    entity_references(action.content)
+                ):
+                    result.entities.add(private.entity_ref)
         for story in scenario.storyboard.stories:
             for act in story.acts:
                 _follow_act(result, (story.name,), act)
@@ -124,27 +124,10 @@ def entity_references(content: object) -> Iterator[str]:
                 yield from entity_references(value)
 
 
-def conditions_of(trigger: Trigger | None) -> Iterator[Condition]:
-    """Every condition of a trigger, if there is one."""
-    if trigger is not None:
-        for group in trigger.groups:
-            yield from group.conditions
-
-
-def refers_to(content: StoryboardElementStateCondition, path: Path) -> bool:
+def refers_to(content: conditions.StoryboardElementStateCondition, path: Path) -> bool:
     """Whether a state condition is about the element with these names from the story down."""
     wanted = tuple(content.element_ref.split("::"))
     return _DEPTH.get(content.element_type) == len(path) and path[len(path) - len(wanted) :] == wanted
-
-
-def _follow_init(scenario: Scenario, dependence: Dependence) -> None:
-    for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            # Where others are at the start is known.
-            if not isinstance(action.content, TeleportAction) and dependence.entities & set(
-                entity_references(action.content)
-            ):
-                dependence.entities.add(private.entity_ref)
 
 
 def _follow_act(dependence: Dependence, above: Path, act: Act) -> None:
@@ -185,120 +168,10 @@ def _follow_event(
         dependence.ends |= {(*path, action.name) for action in event.actions}
 
 
-def actors_of(act: Act, group: ManeuverGroup, event: Event) -> tuple[str, ...]:
-    """Who may act in an event: the group's actors, and whoever triggers it where it is about them."""
-    if not group.actors.select_triggering_entities:
-        return group.actors.entity_refs
-    triggering = [
-        name
-        for trigger in (act.start_trigger, event.start_trigger)
-        for condition in conditions_of(trigger)
-        if condition.triggering_entities is not None
-        for name in condition.triggering_entities.entity_refs
-    ]
-    return tuple(dict.fromkeys([*group.actors.entity_refs, *triggering]))
-
-
 def _value(content: object) -> str:
     """Name of the parameter, variable or signal that an action sets or a condition looks at; empty: none."""
-    if isinstance(content, TrafficSignalStateAction | TrafficSignalCondition):
+    if isinstance(content, TrafficSignalStateAction | conditions.TrafficSignalCondition):
         return content.name
     if isinstance(content, TrafficSignalControllerAction):
         return content.controller_ref
     return str(getattr(content, "parameter_ref", "") or getattr(content, "variable_ref", ""))
-
-
-# ---- vehicles that the storyboard does not drive: those under test, and those that a controller has ----
-EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
-    # CARLA's ScenarioRunner, openscenario_configuration.py: ego vehicles are those of this type.
-    "type": frozenset({"ego_vehicle"}),
-}
-"""Property of a vehicle -> values that leave it to somebody else; both in lower case."""
-
-EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
-"""Names by which CARLA's tools look for the vehicle that they drive (its `role_name`)."""
-
-
-def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
-    """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
-    assigned = assigned_controllers(scenario)
-    egos = {}
-    for entity in scenario.entities:
-        why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
-        if why:
-            egos[entity.name] = why
-    return egos
-
-
-@dataclass(frozen=True, slots=True)
-class Control:
-    """Controllers that drive an entity at some time: their names, and the domains that they have then."""
-
-    controllers: tuple[str, ...]
-    domains: Domains
-
-    def __str__(self) -> str:
-        return f"{' and '.join(self.controllers)}: {self.domains.words()}"
-
-
-def controlled_entities(scenario: Scenario) -> dict[str, Control]:
-    """Entities that controllers drive at some time, by an action that makes them active, in the scenario's order."""
-    assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
-    for actors, action in _private_actions(scenario):
-        for actor in actors if isinstance(action.content, CONTROLLER) else ():
-            actions.setdefault(actor, []).append(action.content)
-    reasons = {}
-    for entity in scenario.entities:
-        names, domains = dict[str, None](), Domains.NONE
-        contents = actions.get(entity.name, [])
-        for controller in assigned[entity.name]:
-            kind = kind_of(controller)
-            asked = Domains.BOTH if kind.at_once else Domains.NONE
-            for domain in _switched_on(content for content in contents if is_meant(controller, content)):
-                asked |= domain
-            if kind.active(asked):
-                names[named(controller)] = None
-                domains |= kind.active(asked)
-        activations = (content for content in contents if isinstance(content, ActivateControllerAction))
-        if scenario.header.is_left_handed and any(_switched_on(activations)):
-            names[AUTOPILOT.name] = None
-            domains = Domains.BOTH
-        if domains:
-            reasons[entity.name] = Control(tuple(names), domains)
-    return reasons
-
-
-def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:
-    return (domain for content in contents for domain, on in switches(content) if on)
-
-
-def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
-    """Controllers of each entity, from the start or later."""
-    assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
-    for actors, action in _private_actions(scenario):
-        content = action.content
-        if isinstance(content, AssignControllerAction) and content.controller is not None:
-            for actor in actors:
-                assigned.setdefault(actor, []).append(content.controller)
-    return assigned
-
-
-def _why(entity: Entity, controllers: Iterable[Controller]) -> str:
-    for controller in controllers:
-        if kind_of(controller).is_external:
-            return f"controller {named(controller)}"
-    for name, value in entity.properties.items():
-        if value.strip().lower() in EXTERNAL_ENTITIES.get(name.strip().lower(), ()):
-            return f"{name} {value}"
-    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
-
-
-def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
-    for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            yield (private.entity_ref,), action
-    for _, act, group in scenario.storyboard.groups():
-        for _, event in group.events():
-            actors = actors_of(act, group, event)
-            for action in event.actions:
-                yield actors, action

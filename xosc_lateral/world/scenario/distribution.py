@@ -60,7 +60,8 @@ class Deterministic(Struct, frozen=True):
 
     def __iter__(self) -> Iterator[ParameterSet]:
         """One combination after another, made when asked for: there may be millions."""
-        return (_merged(combination) for combination in _product(self.parts))
+        chained = itertools.chain.from_iterable
+        return (dict(chained(sets.items() for sets in combination)) for combination in _product(self.parts))
 
 
 def _product(parts: Sequence[ValueSets | SteppedRange]) -> Iterator[tuple[ParameterSet, ...]]:
@@ -80,10 +81,6 @@ def _product(parts: Sequence[ValueSets | SteppedRange]) -> Iterator[tuple[Parame
             chosen[place] = next(rows[place])
         else:
             return
-
-
-def _merged(sets: Sequence[ParameterSet]) -> ParameterSet:
-    return dict(itertools.chain.from_iterable(values.items() for values in sets))
 
 
 MAX_TRIES = 10_000

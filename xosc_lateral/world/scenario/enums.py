@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
+from operator import eq, ge, gt, le, lt, ne
+from typing import Any
 
 
 class EntityCategory(StrEnum):
@@ -55,6 +58,20 @@ class Rule(StrEnum):
     GREATER_OR_EQUAL = "greaterOrEqual"
     LESS_OR_EQUAL = "lessOrEqual"
     NOT_EQUAL_TO = "notEqualTo"
+
+    def holds(self, left: object, right: object) -> bool:
+        """Compare two values of one kind, exactly."""
+        return bool(_OPERATORS[self](left, right))
+
+
+_OPERATORS: dict[Rule, Callable[[Any, Any], bool]] = {
+    Rule.EQUAL_TO: eq,
+    Rule.GREATER_THAN: gt,
+    Rule.LESS_THAN: lt,
+    Rule.GREATER_OR_EQUAL: ge,
+    Rule.LESS_OR_EQUAL: le,
+    Rule.NOT_EQUAL_TO: ne,
+}
 
 
 class TriggeringEntitiesRule(StrEnum):

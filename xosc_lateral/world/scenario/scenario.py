@@ -238,3 +238,44 @@ class Storyboard(Struct, frozen=True):
             for act in story.acts:
                 for group in act.maneuver_groups:
                     yield story, act, group
+
+    def events(self) -> Iterator[StoryEvent]:
+        """Every event, with what it is in, in file order."""
+        for story, act, group in self.groups():
+            for maneuver, event in group.events():
+                yield StoryEvent((story.name, act.name, group.name, maneuver.name, event.name), act, group, event)
+
+
+class StoryEvent(Struct, frozen=True):
+    """An event with what it is in; `path`: its names from the story down."""
+
+    path: tuple[str, ...]
+    act: Act
+    group: ManeuverGroup
+    event: Event
+
+    @property
+    def actors(self) -> tuple[str, ...]:
+        """Who may act in it."""
+        return actors_of(self.act, self.group, self.event)
+
+
+def conditions_of(trigger: Trigger | None) -> Iterator[Condition]:
+    """Every condition of a trigger, if there is one."""
+    if trigger is not None:
+        for group in trigger.groups:
+            yield from group.conditions
+
+
+def actors_of(act: Act, group: ManeuverGroup, event: Event) -> tuple[str, ...]:
+    """Who may act in an event: the group's actors, and whoever triggers it where it is about them."""
+    if not group.actors.select_triggering_entities:
+        return group.actors.entity_refs
+    triggering = [
+        name
+        for trigger in (act.start_trigger, event.start_trigger)
+        for condition in conditions_of(trigger)
+        if condition.triggering_entities is not None
+        for name in condition.triggering_entities.entity_refs
+    ]
+    return tuple(dict.fromkeys([*group.actors.entity_refs, *triggering]))

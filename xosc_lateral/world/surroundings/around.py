@@ -240,19 +240,8 @@ def stretches_within(
     The boxes around both paths, in blocks of rows, are swept along the longer side of the traffic: the work grows with
     the pairs that are near, not with all there are.
 
-    Parameters
-    ----------
-    x, y : iterables of array, shape (n,)
-        One pair of arrays per point, on one time grid; NaN where it is absent; each is looked at once. [m]
-    reach : float
-        [m]
-    blocks : int
-        Of `BLOCK` rows, in a stretch.
-
-    Yields
-    ------
-    slice, list of (int, int)
-        Rows of a stretch with pairs; indices of these, the smaller one first, in lexical order.
+    `x`, `y`: arrays of shape (n,) for each point on one time grid, NaN where it is absent, looked at once; `reach` in
+    [m]; a stretch has `blocks` of `BLOCK` rows. Yields its rows, and pairs of indices in lexical order, each ascending.
     """
     lows, highs = _bounds(x, y)
     for begin in range(0, lows.shape[1], blocks):

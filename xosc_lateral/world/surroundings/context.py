@@ -23,18 +23,7 @@ from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMot
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
-from xosc_lateral.world.surroundings.around import (
-    IN_SIGHT,
-    SIGHT_DISTANCE,
-    Around,
-    Extent,
-    OtherVehicles,
-    Reach,
-    free_space,
-    lane_path,
-    see_along,
-    stretches_within,
-)
+from xosc_lateral.world.surroundings import around
 
 STEERING = 1.0
 """Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
@@ -126,12 +115,12 @@ def _neighbours(
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = _traffic(motion, network, int(grid[0]) % every, every)
     columns = grid // every
-    around = Around.with_no_one(len(grid))
+    nearby = around.Around.with_no_one(len(grid))
     groups = _own_lane_groups(observer, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(observer, network, grid)
     extent, box = traffic.extent, observer.entity.bounding_box
     far = (
-        SIGHT_DISTANCE
+        around.SIGHT_DISTANCE
         + 0.5 * box.length
         + abs(box.center_x)
         + np.max(0.5 * extent.length + np.abs(extent.center_x))
@@ -149,13 +138,13 @@ def _neighbours(
                     continue
                 u, offset = (np.tile(values, len(others)) for values in (own_u[part], observer.offset[grid[members]]))
                 road, s, t, direction = traffic.of(others, columns[members])
-                seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
+                seen = around.see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
                 k = np.flatnonzero(np.abs(seen.ahead) <= far)
-                seen = OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
+                seen = around.OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
                 number, rows = others[k // len(members)], members[k % len(members)]
-                gap = free_space(seen, box, Extent(*(values[number] for values in extent)))
-                around.add(rows, seen, gap, width[rows], traffic.width[number], traffic.is_truck[number])
-    return around.columns(lanes)
+                gap = around.free_space(seen, box, around.Extent(*(values[number] for values in extent)))
+                nearby.add(rows, seen, gap, width[rows], traffic.width[number], traffic.is_truck[number])
+    return nearby.columns(lanes)
 
 
 class _Traffic(NamedTuple):
@@ -165,7 +154,7 @@ class _Traffic(NamedTuple):
     s: FloatArray
     t: FloatArray
     direction: NDArray[np.int8]
-    extent: Extent
+    extent: around.Extent
     width: FloatArray
     """Of each, shape (entities,). [m]"""
     is_truck: BoolArray
@@ -200,7 +189,7 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
     boxes = [one.entity.bounding_box for one in motion.entities]
     length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
     is_truck = np.array([one.entity.vehicle_category in TRUCKS for one in motion.entities])
-    return _Traffic._make([*tables, Extent(length, centre), width, is_truck])
+    return _Traffic._make([*tables, around.Extent(length, centre), width, is_truck])
 
 
 def _own_lane_width(observer: EntityMotion, network: RoadNetwork, grid: IntArray) -> FloatArray:
@@ -242,7 +231,7 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
     parts: list[tuple[slice, list[IntArray]]] = []
     if len(motion.entities) < 2:
         return parts
-    for rows, pairs in stretches_within(where_active("x"), where_active("y"), IN_SIGHT, blocks=64):
+    for rows, pairs in around.stretches_within(where_active("x"), where_active("y"), around.IN_SIGHT, blocks=64):
         both = np.array([*pairs, *(pair[::-1] for pair in pairs)], dtype=np.int64)
         both = both[np.lexsort((both[:, 1], both[:, 0]))]
         ends = np.searchsorted(both[:, 0], np.arange(1, len(motion.entities)))
@@ -252,7 +241,7 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
 
 def _own_lane_groups(
     entity: EntityMotion, network: RoadNetwork, grid: IntArray, direction: NDArray[np.int8]
-) -> list[tuple[IntArray, FloatArray, list[Reach]]]:
+) -> list[tuple[IntArray, FloatArray, list[around.Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float, int], list[IntArray]] = {}
     on = np.flatnonzero(direction)
@@ -267,7 +256,7 @@ def _own_lane_groups(
     for (number, lane_id, _, forward), members in groups.items():
         rows = np.concatenate(members)
         along = entity.s[grid[rows]]
-        path = lane_path(network, number, lane_id, float(along[0]), forward)
+        path = around.lane_path(network, number, lane_id, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
 
@@ -289,32 +278,19 @@ def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
     return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
 
 
-def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> Mapping[str, FloatArray]:
-    """What one environment states, in the units of `segment.CONTEXT_UNITS`."""
-    even = np.ones(len(time))
+def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> dict[str, FloatArray]:
+    """Context columns of what one environment states, shape (n,) each."""
     values: dict[str, FloatArray] = {}
-    clock = environment.time_of_day
+    weather, clock = environment.weather or Weather(), environment.time_of_day
     if clock is not None:
         seconds = clock.date_time.hour * 3600.0 + clock.date_time.minute * 60.0 + clock.date_time.second
-        running = time - start if clock.animation else 0.0
-        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0 * even
-    if environment.friction_scale_factor is not None:
-        values["friction"] = environment.friction_scale_factor * even
-    weather = environment.weather
-    return values if weather is None else values | _stated_weather(weather, even, heading)
-
-
-def _stated_weather(weather: Weather, ones: FloatArray, heading: FloatArray) -> dict[str, FloatArray]:
-    """Light, rain and wind, shape (n,) each."""
-    values: dict[str, FloatArray] = {}
-    if weather.illuminance is not None:
-        values["illuminance"] = weather.illuminance * ones
-    if weather.precipitation_type == "dry":
-        values["rain"] = 0.0 * ones
-    elif weather.precipitation_type == "rain" and weather.precipitation_intensity is not None:
-        values["rain"] = weather.precipitation_intensity * ones
+        running = time - start if clock.animation else np.zeros(len(time))
+        values["time_of_day"] = (seconds + running) / 3600.0 % 24.0
+    rain = {"dry": 0.0, "rain": weather.precipitation_intensity}.get(weather.precipitation_type or "")
+    constant = {"friction": environment.friction_scale_factor, "illuminance": weather.illuminance, "rain": rain}
+    values |= {name: np.full(len(time), value) for name, value in constant.items() if value is not None}
     if weather.wind_speed is not None and weather.wind_direction is not None:
-        values["wind_speed"] = weather.wind_speed * ones
+        values["wind_speed"] = np.full(len(time), weather.wind_speed)
         # 90 deg blows to the left of travel; the standard's direction is where the wind blows to, against world x
         values["wind_direction"] = np.degrees(weather.wind_direction - heading) % 360.0
     return values

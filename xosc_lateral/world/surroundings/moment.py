@@ -13,16 +13,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.around import (
-    IN_SIGHT,
-    Around,
-    Extent,
-    Reach,
-    free_space,
-    lane_path,
-    pairs_now,
-    see_along,
-)
+from xosc_lateral.world.surroundings import around
 from xosc_lateral.world.surroundings.context import lanes_beside, road_columns, spread_out
 
 
@@ -37,7 +28,7 @@ class Roads(Protocol):
         """Where the lane section begins that a place is in: places of one section share a path. [m]"""
         ...
 
-    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+    def path(self, road: int, lane: int, s: float) -> list[around.Reach]:
         """Lane sections within reach along the lane, both ways."""
         ...
 
@@ -68,9 +59,9 @@ class OpenDriveRoads:
         """See `Roads`."""
         return self.network.section_at(road, s)[0]
 
-    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+    def path(self, road: int, lane: int, s: float) -> list[around.Reach]:
         """See `Roads`."""
-        return lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
+        return around.lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
 
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
         """See `Roads`."""
@@ -117,21 +108,21 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
     direction[on] = roads.directions(*where[:2])
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
-    around = Around.with_no_one(n)
+    nearby = around.Around.with_no_one(n)
     for path, u, i, j in _along_paths(roads, places, on):
-        seen = see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
-        extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
-        around.add(i, seen, free_space(seen, *extents), width[i], places.width[j], is_truck[j])
+        seen = around.see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
+        extents = (around.Extent(places.length[k], places.center_x[k]) for k in (i, j))
+        nearby.add(i, seen, around.free_space(seen, *extents), width[i], places.width[j], is_truck[j])
     lanes = {side: is_there.astype(np.float64) for side, is_there in lanes_beside(road).items()}
-    return road | around.columns(lanes, always_fade=True)
+    return road | nearby.columns(lanes, always_fade=True)
 
 
 def _along_paths(
     roads: Roads, places: Places, on: IntArray
-) -> Iterator[tuple[list[Reach], FloatArray, IntArray, IntArray]]:
+) -> Iterator[tuple[list[around.Reach], FloatArray, IntArray, IntArray]]:
     """For every lane path: the path, where everybody on it is along it [m], and pairs of one on it and one in sight."""
     u, group = np.zeros(len(places.x)), np.full(len(places.x), -1)
-    origins: dict[tuple[int, int, float], tuple[int, float, list[Reach]]] = {}
+    origins: dict[tuple[int, int, float], tuple[int, float, list[around.Reach]]] = {}
     for k in on.tolist():
         road, lane, s = int(places.road[k]), int(places.lane[k]), float(places.s[k])
         key = (road, lane, roads.section(road, lane, s))
@@ -139,7 +130,7 @@ def _along_paths(
             origins[key] = (len(origins), s, roads.path(road, lane, s))
         group[k], start, path = origins[key]
         u[k] = path[0].sign * (s - start)
-    a, b = pairs_now(np.where(group >= 0, places.x, np.nan), places.y, IN_SIGHT)
+    a, b = around.pairs_now(np.where(group >= 0, places.x, np.nan), places.y, around.IN_SIGHT)
     vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
     order = np.argsort(group[vehicle], kind="stable")
     vehicle, other = vehicle[order], other[order]

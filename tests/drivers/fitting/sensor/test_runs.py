@@ -10,7 +10,7 @@ from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.cuts import cut_runs
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.fitting.fitting import driver_runs, durations_of, rows_of
+from xosc_lateral.drivers.fitting.fitting import driver_runs, rows_of
 from xosc_lateral.drivers.fitting.sensor.periodogram import WINDOWS
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
@@ -45,7 +45,7 @@ def test_a_sensors_share_is_over_time_not_over_rows() -> None:
     noise = 0.03 * rng.normal(size=len(offset))
     uneven = Drive("d", time[seen], (offset + noise)[seen], np.full(seen.sum(), 3.5))
     (run,) = cut_runs(uneven)
-    durations = durations_of([run], [uneven])
+    _, durations, _ = rows_of([run], [uneven])
     assert durations is not None
     assert np.concatenate(durations).sum() == pytest.approx(run.time[-1] - run.time[0], abs=0.3)
     _, sensor = driver_runs([run], [uneven])
@@ -57,7 +57,7 @@ def test_rows_as_recorded_are_those_within_each_run() -> None:
     drive = recorded()
     run = made_run(np.zeros(50))
     run = type(run)("d", 0, 110.0 + STEP * np.arange(50), run.offset, run.lane_width)
-    rows, rate = rows_of([run], [drive])
+    rows, _, rate = rows_of([run], [drive])
     assert rate == pytest.approx(20.0)
     assert rows is not None
     inside = (drive.time >= 110.0 - 1e-6) & (drive.time <= 119.8 + 1e-6)
@@ -65,7 +65,7 @@ def test_rows_as_recorded_are_those_within_each_run() -> None:
 
 
 def test_without_the_drive_of_a_run_there_are_no_rows() -> None:
-    assert rows_of([made_run(np.zeros(50), drive="elsewhere")], [recorded()]) == (None, None)
+    assert rows_of([made_run(np.zeros(50), drive="elsewhere")], [recorded()]) == (None, None, None)
 
 
 def test_a_profile_without_a_sensor_says_so() -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise, fit_shaped_noise, mean_power
+from xosc_lateral.drivers.fitting.models.two_level import fit_shaped_noise, mean_power
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drivers.model.linear_filters import JitKernel, _convolve_compiled, convolve
 
 

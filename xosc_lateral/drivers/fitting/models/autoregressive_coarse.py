@@ -30,7 +30,7 @@ from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     measuring_low_pass,
     stabilise,
 )
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ShapedNoise
 
 RIDGE = 1e-7
 """Share of the mean square that is added to the normal equations' diagonal. [-]"""
@@ -58,14 +58,8 @@ def fit_autoregression(
     the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with
     it, and a run of a minute would then forget twice too fast.
 
-    Parameters
-    ----------
-    runs, drivers : sequence of array, shape (n_i,), and of str
-        Series with the mean of all taken out [any unit], and whose each is.
-    order, every : int
-        Of the model, >= 1; one step of it in samples of the runs.
-    between : float
-        Variance of the drivers' own means.
+    `runs`, shape (n_i,): with the mean of all taken out [any unit]; `drivers`: whose each is; `every`: one step of the
+    model in samples of the runs.
     """
     long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
     pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
@@ -209,6 +203,12 @@ def coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
     return np.asarray(coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY)
 
 
+def fine_power(fine: ShapedNoise, knots: FloatArray) -> FloatArray:
+    """Of the fine movement, likewise; white noise of variance 1 has 1."""
+    waves = np.exp(-2j * np.pi * np.outer(knots, np.arange(len(fine.kernel))))
+    return np.asarray(NOISE_VARIANCE * np.abs(waves @ fine.kernel) ** 2)
+
+
 def rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
     """From 0 to 1 where the fine noise begins, shape of `hertz` [Hz]. [-]"""
     low, high = settings.fine_from
@@ -257,36 +257,27 @@ def _typical_power(runs: Sequence[FloatArray], settings: FitSettings) -> tuple[F
 class FitSettings:
     """Constants of the fit."""
 
-    order: int = 16
-    """Memory of the coarse movement. [s]"""
-    n_knots: int = 51
-    """Knots of the fine noise's damping."""
+    order: int = 16  # Memory of the coarse movement. [s]
+    n_knots: int = 51  # Knots of the fine noise's damping.
     n_taps: int = 71
+    # Of its kernel: measured noise falls by five decades between 0.3 and 2.5 Hz, so nothing may leak.
     taper: float = 5.0
-    """Of its kernel: measured noise falls by five decades between 0.3 and 2.5 Hz, so nothing may leak."""
-    scale_band: tuple[float, float] = (0.1, 0.3)
-    """Frequencies at which all power is taken to be coarse. [Hz]"""
+    scale_band: tuple[float, float] = (0.1, 0.3)  # Frequencies at which all power is taken to be coarse. [Hz]
+    # The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
     fine_from: tuple[float, float] = (0.2, 0.33)
-    """The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
-    """
+    # Lengths of spectral windows, the first that enough runs are as long as. [s]
     spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
-    """Lengths of spectral windows, the first that enough runs are as long as. [s]"""
+    # Lengths of the windows whose spectra are compared, likewise. The power falls by 14 dB from 0.3 to 0.5 Hz, which
+    # windows of 10 s can't show: each of their frequencies is 0.4 Hz wide. [s]
     compared_windows: tuple[float, ...] = (30.0, 20.0, 10.0)
-    """Lengths of the windows whose spectra are compared, likewise. The power falls by 14 dB from 0.3 to 0.5 Hz, which
-    windows of 10 s can't show: each of their frequencies is 0.4 Hz wide. [s]"""
     fine_window: float = 2.0
-    coarse_window: float = 5.0
-    """Windows that volatility is seen by. [s]"""
+    coarse_window: float = 5.0  # Windows that volatility is seen by. [s]
+    # Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`.
     far: tuple[float, float] = (0.5, 1.0)
-    """Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`."""
-    farthest: float = 120.0
-    """[s]"""
-    snippet: float = 10.0
-    """Length of the snippets that are compared. [s]"""
-    rounds: int = 3
-    """Of simulating and comparing: more change nothing beyond the standard error of held-out drives."""
-    seed: int = 20240517
-    """Of the simulations."""
+    farthest: float = 120.0  # [s]
+    snippet: float = 10.0  # Length of the snippets that are compared. [s]
+    rounds: int = 3  # Of simulating and comparing: more change nothing beyond the standard error of held-out drives.
+    seed: int = 20240517  # Of the simulations.
     step: float = STEP
 
 

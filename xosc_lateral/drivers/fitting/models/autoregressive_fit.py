@@ -21,6 +21,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 
 import numpy as np
 from msgspec.structs import replace
@@ -188,7 +189,7 @@ def with_volatility(
     steady = simulate(model, 2000, settings.seed, drivers=64)
     reference = [split_bands(row, settings.step) for row in steady]
     candidates = []
-    for which, seconds in ((_wiggle, settings.coarse_window), (_fine_of, settings.fine_window)):
+    for which, seconds in ((_wiggle, settings.coarse_window), (itemgetter(1), settings.fine_window)):
         window = round(seconds / settings.step)
         n_lags = max(2, int(MAX_LAG / seconds))
         measured = [log_power(which(pair), window) for pair in bands if len(which(pair)) >= window]
@@ -212,10 +213,6 @@ def _wiggle(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
     """Second difference of the slow part over a second: coarse movement without its slow drift."""
     slow, every = pair[0], COARSE_EVERY
     return np.asarray(slow[2 * every :] - 2.0 * slow[every:-every] + slow[: -2 * every])
-
-
-def _fine_of(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
-    return pair[1]
 
 
 def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: FitSettings) -> AutoregressiveModel:
@@ -270,7 +267,7 @@ def _gain(model: AutoregressiveModel, lacks: FloatArray) -> FloatArray:
 
 
 def _coarse_gain(lacks: FloatArray, settings: FitSettings) -> FloatArray:
-    """Factor on the coarse movement's amplitude at `FREQUENCIES`, likewise.
+    """Factor on the coarse movement's amplitude at `FREQUENCIES`, from what the log spectrum of snippets lacks.
 
     Where the fine noise could be and is not: from its slowest on up to the border, and a knot beyond. What is slower,
     the covariances of whole runs have: typical windows of a driver who drifts calmly and returns briskly lack it.

@@ -14,7 +14,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.model.core.noise import fit_shaped_noise
+from xosc_lateral.drivers.drives.filters import periodograms
+from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, MarkovChain, bin_of
 from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
 from xosc_lateral.drivers.model.linear_filters import convolve
@@ -48,6 +49,34 @@ def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS)
     return MarkovChain(counts)
 
 
+def fit_shaped_noise(
+    fine_parts: Sequence[FloatArray], *, n_knots: int = N_KNOTS, n_taps: int = KERNEL_TAPS
+) -> ShapedNoise:
+    """Fit the damping function to measured fine parts [lane widths], one array of shape (n_i,) per run.
+
+    Raises `NotEnoughDataError` when no run holds a window of 5 s.
+    """
+    longest = max(map(len, fine_parts), default=0)
+    window = min(n_taps - 1, longest)
+    if window < n_taps // 2:
+        raise NotEnoughDataError(f"the longest fine part has {longest} values, {n_taps // 2} are needed")
+    power = mean_power(fine_parts, window)
+    at = np.linspace(0.0, 1.0, len(power))
+    hats = np.maximum(0.0, 1.0 - np.abs(at[:, None] * (n_knots - 1) - np.arange(n_knots)[None, :]))
+    damping = np.linalg.lstsq(hats, np.sqrt(power / NOISE_VARIANCE), rcond=None)[0]
+    return ShapedNoise(np.maximum(damping, 0.0), n_taps)
+
+
+def mean_power(parts: Sequence[FloatArray], window: int) -> FloatArray:
+    """Mean power per frequency over half-overlapping Hann windows, shape (window // 2 + 1,). [square of the unit]"""
+    total, count = np.zeros(window // 2 + 1), 0
+    for part in parts:
+        powers = periodograms(part, window)
+        total += powers.sum(axis=0)
+        count += len(powers)
+    return total / max(count, 1)
+
+
 def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:
     """Fit to relative offsets [-], one array of shape (n_i,) per run, evenly sampled at the model's step.
 
@@ -75,13 +104,17 @@ SEED = 0  # The same each time: same drives, same profile.
 def correct_two_level(model: TwoLevelModel) -> TwoLevelModel:
     """The model whose samples, fitted again, are like the one given: leaving rate of all bins together, and damping."""
     target, corrected = leaving_rate(model.counts), model
-    factor, damping = 1.0, np.array(model.damping)
+    factor, damping, total = 1.0, np.array(model.damping), model.counts.sum(axis=1)
+    out = model.counts * ~np.eye(len(total), dtype=np.bool_)  # transitions out of their bin, at most all of them
     for number in range(ROUNDS):
         stream = corrected.stream(np.random.SeedSequence([SEED, number]))
         again = fit_two_level([np.sum(stream.take(STEPS), axis=0)], model.settings)
         factor *= float(_bounded(target / max(leaving_rate(again.counts), 1e-12)))
         damping = damping * _bounded(model.damping / np.maximum(again.damping, 1e-12))
-        corrected = TwoLevelModel(model.settings, _left_more_often(model.counts, factor), damping)
+        most = np.minimum(factor, total / np.maximum(out.sum(axis=1), 1))
+        parts = np.rint(PARTS * out * most[:, None]).astype(np.int64)
+        counts = parts + np.diag(np.maximum(PARTS * total - parts.sum(axis=1), 0))
+        corrected = TwoLevelModel(model.settings, counts, damping)
     return corrected
 
 
@@ -92,12 +125,3 @@ def leaving_rate(counts: IntArray) -> float:
 
 def _bounded(ratio: FloatArray | float) -> FloatArray:
     return np.clip(ratio, 1.0 / LARGEST_CHANGE, LARGEST_CHANGE)
-
-
-def _left_more_often(counts: IntArray, factor: float) -> IntArray:
-    """Counts, in parts, with so many times the transitions out of each bin, at most all of them."""
-    out = counts * ~np.eye(len(counts), dtype=np.bool_)
-    total, leaving = counts.sum(axis=1), out.sum(axis=1)
-    most = np.minimum(factor, total / np.maximum(leaving, 1))
-    parts = np.rint(PARTS * out * most[:, None]).astype(np.int64)
-    return np.asarray(parts + np.diag(np.maximum(PARTS * total - parts.sum(axis=1), 0)))

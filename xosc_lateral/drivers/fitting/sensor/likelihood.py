@@ -81,39 +81,13 @@ def expected_log_density(frequency: FloatArray, shift: float = 0.0) -> FloatArra
     return np.asarray(-POWER_BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
 
 
-def _change_with_corner(frequency: FloatArray, shift: float) -> FloatArray:
-    """Derivative of `expected_log_density` with respect to the shift. [-]"""
-    steps = POWER_BEYOND - POWER_BELOW
-    return np.asarray(steps / (1.0 + np.exp(-steps * (np.log(frequency / BRISKEST_CORNER) - shift))))
-
-
-def _slopes() -> FloatArray:
-    matrix = np.zeros((N_KNOTS - 1, N_KNOTS))
-    rows = np.arange(N_KNOTS - 1)
-    matrix[rows, rows + 1] = 1.0 / np.diff(_LOG)
-    matrix[rows, rows] = -matrix[rows, rows + 1]
-    return matrix
-
-
-SLOPES = _slopes()
+SLOPES = np.diff(np.eye(N_KNOTS), axis=0) / np.diff(_LOG)[:, None]
 """From knot values to slopes, shape (n - 1, n)."""
 
-
 _BOUND = np.flatnonzero(0.5 * (_LOG[1:] + _LOG[:-1]) > np.log(FREE_BELOW))
-
-
-def _rows() -> FloatArray:
-    free = np.arange(_BOUND[0])
-    return np.concatenate(
-        [
-            SLOPES[_BOUND] / SLOPE_SD,
-            np.diff(SLOPES[_BOUND], axis=0) / BEND_SD,
-            (SLOPES[free + 1] - SLOPES[free]) / FREE_BEND_SD,
-        ]
-    )
-
-
-_ROWS = _rows()
+_BENDS = np.diff(SLOPES, axis=0)
+_ROWS = np.concatenate([SLOPES[_BOUND] / SLOPE_SD, _BENDS[_BOUND[:-1]] / BEND_SD, _BENDS[: _BOUND[0]] / FREE_BEND_SD])
+"""Slopes and their changes in units of the prior, from knot values."""
 
 
 def _of_slopes(values: FloatArray) -> FloatArray:
@@ -132,7 +106,9 @@ def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray
     jacobian = np.zeros((len(_ROWS) + 1, N_STATE))
     jacobian[:-1, :N_KNOTS] = _ROWS
     if is_corner_free:
-        jacobian[:-1, N_KNOTS] = -_of_slopes(_change_with_corner(KNOTS, shift))
+        steps = POWER_BEYOND - POWER_BELOW
+        change = steps / (1.0 + np.exp(-steps * (np.log(KNOTS / BRISKEST_CORNER) - shift)))
+        jacobian[:-1, N_KNOTS] = -_of_slopes(change)  # of the expected density, with the shift
     jacobian[-1, N_KNOTS] = 1.0 / deviation
     residuals = _ROWS @ knots - _of_slopes(expected_log_density(KNOTS, shift))
     return np.append(residuals, excess / deviation), jacobian
@@ -209,25 +185,20 @@ class Colour:
 class Known:
     """A sensor whose error is known."""
 
-    deviation: float
-    """Standard deviation on the table's rows. [m]"""
-    rate: float
-    """Rows per second. [Hz]"""
-    rounding: float = 0.0
-    """What rounding has of its square, which is known from the rows. [m2]"""
+    deviation: float  # Standard deviation on the table's rows. [m]
+    rate: float  # Rows per second. [Hz]
+    rounding: float = 0.0  # What rounding has of its square, which is known from the rows. [m2]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
     """The maximum."""
 
+    # The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `KNOTS`.
     state: FloatArray
-    """The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `vehicle_bound`."""
-    white: float
-    """Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none."""
+    white: float  # Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
     colour: float
-    loss: float
-    """Minus log posterior."""
+    loss: float  # Minus log posterior.
 
     @property
     def knots(self) -> FloatArray:
@@ -244,8 +215,7 @@ class Measured:
     """What driver and sensor are to explain."""
 
     data: Periodogram
-    base: FloatArray
-    """Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]"""
+    base: FloatArray  # Density of the sensor's that is known already, at the data's frequencies, shape (n,). [m2/Hz]
     known: Known | None = None
 
 

@@ -41,12 +41,9 @@ BINS_FROM, BIN = 0.12, 0.05
 class Periodogram:
     """Mean power density and its weight, shape (n,) each."""
 
-    frequency: FloatArray
-    """Mean of each bin. [Hz]"""
-    density: FloatArray
-    """One-sided: integrates to the variance. [m2/Hz]"""
-    weight: FloatArray
-    """Independent ordinates in each bin. [-]"""
+    frequency: FloatArray  # Mean of each bin. [Hz]
+    density: FloatArray  # One-sided: integrates to the variance. [m2/Hz]
+    weight: FloatArray  # Independent ordinates in each bin. [-]
 
     @property
     def count(self) -> float:
@@ -225,7 +222,7 @@ KNOTS = np.array([0.01, 0.02, 0.035, LOWEST_FREQUENCY, 0.07, 0.1, 0.14, 0.2, 0.2
 """Of the logarithm of the half width's density, over the logarithm of frequency. [Hz]"""
 
 BEND_SD = 1.0
-"""Of a change of the slope from one knot to the next, as for a driver's (`vehicle_bound`). [-]"""
+"""Of a change of the slope from one knot to the next, as for a driver. [-]"""
 
 FINE = 1000
 """Frequencies of the variance's integral. [-]"""

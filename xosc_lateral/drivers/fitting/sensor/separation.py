@@ -54,11 +54,10 @@ MOST_NOISE = 0.9
 class Separation:
     """Densities of driver and sensor."""
 
-    knots: FloatArray
-    """Of the driver's density, see `vehicle_bound`."""
+    knots: FloatArray  # Of the driver's density, see `KNOTS`.
     sensor: SensorModel
+    # Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
     beside: Callable[[FloatArray], FloatArray]
-    """Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]"""
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
@@ -99,16 +98,16 @@ def separate(
 
     Parameters
     ----------
-    runs, step : sequence of array, float
+    runs, step
         Offsets [m] at an even step [s].
-    rows, durations : sequence of array, optional
+    rows, durations
         The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
         long each row stands for, where rows are not even in time [s].
-    rate : float, optional
+    rate
         Rows per second; without, as many as there are in the time of the runs. [Hz]
-    sensor_noise : float, optional
+    sensor_noise
         Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    half_widths, one_camera : sequence of array, bool, optional
+    half_widths, one_camera
         Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
         that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
     """
@@ -128,15 +127,19 @@ def separate(
         grain > COARSE_STEP_RATIO * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
     )
     is_rounded = grain > 0.0 and not too_coarse
-    rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
-    rounded_off = uniform_variance(grain) if is_rounded else 0.0
+    rounding: Callable[[FloatArray], FloatArray] = np.zeros_like
+    rounded_off = 0.0
+    if is_rounded:
+        rounding, rounded_off = _rounding(data, grain, variance, per_second), uniform_variance(grain)
     known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
     asked = Measured(data, rounding(data.frequency), known)
     view = second_view(half_widths, step) if half_widths else None
     candidates = explanations(asked, view, only_view=one_camera)
     least = _taken(candidates)
     best, colour = least.solution, least.colour
-    beside = _with_view(rounding, best, colour)
+    beside = rounding
+    if colour.view is not None:
+        beside = lambda frequency: rounding(frequency) + best.coloured(colour, frequency)  # noqa: E731
     result = Separation(best.knots, _sensor(best, colour, grain), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     error = _in_band(best, colour, data)
@@ -169,15 +172,6 @@ def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None
     return float(np.average((values - np.average(values, weights=weights)) ** 2, weights=weights))
 
 
-def _with_view(
-    rounding: Callable[[FloatArray], FloatArray], solution: Solution, colour: Colour
-) -> Callable[[FloatArray], FloatArray]:
-    """Density of rounding, and of errors that a second view shows, where one does."""
-    if colour.view is None:
-        return rounding
-    return lambda frequency: rounding(frequency) + solution.coloured(colour, frequency)
-
-
 def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
     """The same, if no lane ever widened, and as far as 95 % of what pitch or errors of both markings alike make go."""
     shift = NORMAL_95 * LEVEL_SD
@@ -202,10 +196,6 @@ def _sensor(
 
 DIGITS = 7
 """Significant digits kept of a sensor's numbers: what differs beyond is the processor's rounding. [-]"""
-
-
-def _no_density(frequency: FloatArray) -> FloatArray:
-    return np.zeros(np.shape(frequency))
 
 
 def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> Callable[[FloatArray], FloatArray]:
@@ -278,7 +268,10 @@ Slower ones lie where a driver's spectrum is free: nothing would separate them f
 LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
 """By order. A steep fall from a lower corner looks like a driver's own. [Hz]"""
 
-CLIMB = 10
+CORNER_DIGITS = 3
+"""That the climb resolves: the same on any machine. [-]"""
+
+CLIMB_STEPS = 10
 """Steps of the climb between the best corner's neighbours: a hundredth of the corner. [-]"""
 
 
@@ -314,7 +307,8 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     from scipy.optimize import minimize_scalar
 
     count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
-    corners = [_in_digits(c) for c in np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count) if c >= LEAST_CORNER[order]]
+    tried_at = np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count)
+    corners = all_significant(tried_at[tried_at >= LEAST_CORNER[order]], CORNER_DIGITS)
     grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]
     yield from grid
     at = int(np.argmin([one.criterion for one in grid]))
@@ -322,17 +316,12 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     tried: list[Explanation] = []
 
     def lacking(log_corner: float) -> float:
-        colour = Colour(order, _in_digits(np.exp(log_corner)), alone)
+        colour = Colour(order, significant(np.exp(log_corner), CORNER_DIGITS), alone)
         tried.append(_explanation(measured, colour, grid[at].solution))
         return tried[-1].criterion
 
-    minimize_scalar(lacking, bounds=(low, high), method="bounded", options={"maxiter": CLIMB, "xatol": 0.01})
+    minimize_scalar(lacking, bounds=(low, high), method="bounded", options={"maxiter": CLIMB_STEPS, "xatol": 0.01})
     yield from tried
-
-
-def _in_digits(corner: float) -> float:
-    """To the digits that the climb resolves: the same on any machine. [Hz]"""
-    return significant(corner, 3)
 
 
 def _explanation(measured: Measured, colour: Colour, start: Solution | None = None) -> Explanation:

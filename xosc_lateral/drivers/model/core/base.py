@@ -13,13 +13,15 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
 import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.records import Record, kebab
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.model.records import Record, frozen_array, kebab, set_once
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +42,7 @@ class CoreStream(Protocol):
     A stream can be copied (`copy.deepcopy`) to come back to a state.
     """
 
-    state: Any
-    """All that changes while driving, a msgspec struct; `CoreModel.resume` goes on from it."""
+    state: Any  # All that changes while driving, a msgspec struct; `CoreModel.resume` goes on from it.
 
     @property
     def mean(self) -> FloatArray | float:
@@ -59,14 +60,12 @@ class CoreStream(Protocol):
 class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
     """Parameters of a core model: frozen, numbers only. A new one subclasses this and is listed in `registry`."""
 
-    kind: ClassVar[str]
-    """Name in the profile file: the class's without `Model`, in lower case with hyphens."""
+    kind: ClassVar[str]  # Name in the profile file: the class's without `Model`, in lower case with hyphens.
 
-    State: ClassVar[type]
-    """Type of its streams' state."""
+    State: ClassVar[type]  # Type of its streams' state.
 
+    # Whether its fine part is a share of the lane's width, or as large in any lane.
     fine_scales_with_lane: ClassVar[bool] = True
-    """Whether its fine part is a share of the lane's width, or as large in any lane."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
@@ -112,12 +111,9 @@ class ModelKind(StrEnum):
 class ClockState(msgspec.Struct):
     """Where a changed time is."""
 
-    time: float = 0.0
-    """Own time of the next value, in steps. [-]"""
-    held: FloatArray | None = None
-    """Values of the source that are still needed, shape (k, drivers)."""
-    first: int = 0
-    """Index in the source of the first of them."""
+    time: float = 0.0  # Own time of the next value, in steps. [-]
+    held: FloatArray | None = None  # Values of the source that are still needed, shape (k, drivers).
+    first: int = 0  # Index in the source of the first of them.
 
 
 def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int, rate: FloatArray | None) -> FloatArray:
@@ -158,3 +154,45 @@ def _read(state: ClockState, source: Callable[[int], FloatArray], times: FloatAr
     done = max(0, int(knots[-1]) - 2 - state.first)
     state.held, state.first = held[done:], state.first + done
     return np.asarray(result)
+
+
+# ---- fine movement: uniform white noise shaped by a kernel, phi = R * k (arXiv:2405.17080, section III) ----
+# The amplitude spectrum of the measured fine part, relative to that of the noise, is approximated by a piecewise linear
+# damping function over frequency; its inverse transform is the kernel.
+N_KNOTS = 11
+"""Knots of the damping function, evenly from 0 to half the sampling rate. [-]"""
+
+KERNEL_TAPS = 51
+"""Taps of the kernel (odd): 10 s at 5 Hz, one snippet. [-]"""
+
+
+class ShapedNoise(Record, frozen=True, eq=False, dict=True):
+    """Noise with a damping function.
+
+    Raises `DriverProfileError` if a damping is negative or not finite, or the kernel's length even.
+    """
+
+    # At frequencies evenly spaced from 0 to half the sampling rate, shape (n_knots,); >= 0. [lane widths]
+    damping: FloatArray
+    n_taps: int = KERNEL_TAPS  # Length of the kernel, odd.
+    taper: float = 0.0  # Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]
+
+    def __post_init__(self) -> None:
+        damping = frozen_array(self.damping)
+        if damping.ndim != 1 or len(damping) < 2 or not np.isfinite(damping).all() or damping.min() < 0:
+            raise DriverProfileError(f"fine noise: damping {damping.tolist()}, expected two or more values >= 0")
+        if self.n_taps < 1 or self.n_taps % 2 == 0:
+            raise DriverProfileError(f"fine noise: kernel of {self.n_taps} taps, expected an odd number")
+        set_once(self, damping=damping)
+
+    @cached_property
+    def kernel(self) -> FloatArray:
+        """Inverse transform of the damping: real, symmetric about its middle, shape (n_taps,). [lane widths]"""
+        frequency = np.arange(self.n_taps // 2 + 1) * 2.0 / self.n_taps  # in units of half the sampling rate
+        damping = np.interp(frequency, np.linspace(0.0, 1.0, len(self.damping)), self.damping)
+        kernel = np.roll(np.fft.irfft(damping, self.n_taps), self.n_taps // 2)
+        return np.asarray(kernel * np.kaiser(self.n_taps, self.taper))
+
+
+NOISE_VARIANCE = 1.0 / 12.0
+"""Of uniform noise in [-0.5, 0.5). [-]"""

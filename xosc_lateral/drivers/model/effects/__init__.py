@@ -9,18 +9,28 @@ from typing import Any
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.plugins import defined_in, entry_points
-from xosc_lateral.drivers.model.effects.base import Acts, Effect, EffectTerms
-from xosc_lateral.drivers.model.effects.column import ColumnEffect
-from xosc_lateral.drivers.model.effects.hidden import Adapted, HiddenEffect, Population, Step, TimeSmooth, VarianceTrend
-from xosc_lateral.drivers.model.effects.processes import Cycle, Drift, Regimes
-from xosc_lateral.drivers.model.effects.product import Factor, Form, Product
+from xosc_lateral.drivers.model.effects.base import Acts, ColumnEffect, Effect, EffectTerms
+from xosc_lateral.drivers.model.effects.hidden import (
+    Adapted,
+    Cycle,
+    Drift,
+    HiddenEffect,
+    Population,
+    Regimes,
+    Step,
+    TimeSmooth,
+    VarianceTrend,
+)
 from xosc_lateral.drivers.model.effects.shapes import (
     Angular,
+    Factor,
+    Form,
     Levels,
     Linear,
     Magnitude,
     Nearness,
     Piecewise,
+    Product,
     Proximity,
     Saturating,
     Threshold,

@@ -22,14 +22,10 @@ from xosc_lateral.drivers.model.linear_filters import recur
 class ResponseState(msgspec.Struct):
     """Where a response is."""
 
-    held: FloatArray | None = None
-    """Last rows of the quantity, as far back as they are still needed, shape (m, k)."""
-    taken: int = 0
-    """Rows of the quantity seen."""
-    given: int = 0
-    """Rows of the response given."""
-    settled: FloatArray | None = None
-    """Last response of each first-order lag, shape (order * k,)."""
+    held: FloatArray | None = None  # Last rows of the quantity, as far back as they are still needed, shape (m, k).
+    taken: int = 0  # Rows of the quantity seen.
+    given: int = 0  # Rows of the response given.
+    settled: FloatArray | None = None  # Last response of each first-order lag, shape (order * k,).
 
 
 class Response:
@@ -40,22 +36,8 @@ class Response:
     Row i of the response is due once all rows of its preview were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
 
-    Parameters
-    ----------
-    step : float
-        Of the even time grid. [s]
-    lag_s : float
-        Delay; negative: preview. [s]
-    response_s : float
-        Time constant of each first-order lag; 0 for none. [s]
-    state : ResponseState, optional
-        To go on from.
-    order : int
-        Count of first-order lags: after two, a jump is a bend without a corner.
-    delay : int
-        Rows that everything comes later by, for who doesn't know what lies ahead.
-    course : sequence of (float, float)
-        Further delay [s] and weight [-] of each shift; none: one of weight 1.
+    Of an even grid of a `step` [s]; `lag_s`, `response_s`, `order` and `course` as in `ColumnEffect`; `delay`: rows
+    that everything comes later by, for who doesn't know what lies ahead.
     """
 
     def __init__(

@@ -13,15 +13,15 @@ from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.carla import fit_carla
 from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Player, TargetPlayer, WrittenScenario
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
+from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions, add_lane_offsets
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
-from xosc_lateral.files.openscenario.write.trajectory_scenario import replay
+from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
-from xosc_lateral.world.scenario.expressions import ExpressionError
+from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.scenario import Scenario
 
 
@@ -76,8 +76,6 @@ def write_converted(
     if chains is None:
         converted = replay(draft, trajectories)
     else:
-        from xosc_lateral.files.openscenario.write.lane_offset_scenario import add_lane_offsets
-
         converted = add_lane_offsets(draft, chains, lateral or LateralActions.of(scenario), trajectories)
     draft.override_parameters()
     _fit(draft, converted, is_reactive=chains is not None)

@@ -11,21 +11,26 @@ planned from wherever an action has left it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.lateral_actions import LateralActions
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
 from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, gives_lateral
 from xosc_lateral.world.scenario.enums import Priority
+from xosc_lateral.world.scenario.global_actions import AddEntityAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
+from xosc_lateral.world.scenario.scenario import Scenario
 
 CHAIN = "xosc-lateral offsets"
 TURNS = 10000
@@ -236,3 +241,75 @@ def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str]) -> etree._E
     action = build.sub(owner, "LateralAction/LaneOffsetAction", continuous="false")
     build.sub(action, "LaneOffsetActionDynamics", **dynamics)
     return build.sub(action, "LaneOffsetTarget")
+
+
+# ---- What moves entities sideways in a storyboard or puts them th ----
+class LateralAction(Struct, frozen=True):
+    """A lateral action, a teleport or the adding of an entity."""
+
+    path: tuple[str, ...]  # its names from the story down
+    kind: str  # type and name that a condition refers to it by
+    reference: str
+    repeats: bool = False  # it may run more than once
+    adds: bool = False  # it adds the entity
+    steers: bool | None = None  # it gives the lateral domain to a controller; False: it takes it back
+
+
+class LateralActions(Struct, frozen=True):
+    """Of a scenario's events, by entity, in file order; and who changes its speed or has a controller."""
+
+    by_entity: Mapping[str, tuple[LateralAction, ...]]
+    changing_speed: frozenset[str]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> LateralActions:
+        """Those of a scenario."""
+        names, controls = Counter(_names(scenario)), controlled_entities(scenario)
+        by_entity: dict[str, dict[LateralAction, None]] = {}
+        changing = set(controls)
+        for at in scenario.storyboard.events():
+            repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
+            for action in at.event.actions:
+                content, actors, steers = action.content, at.actors, gives_lateral(action.content)
+                if isinstance(content, LONGITUDINAL):
+                    changing |= set(actors)
+                adds = isinstance(content, AddEntityAction)
+                if isinstance(content, AddEntityAction):
+                    actors = (content.entity_ref,)
+                elif steers is not None:
+                    actors = tuple(a for a in actors if a in controls and Domains.LATERAL in controls[a].domains)
+                elif not isinstance(content, (*LATERAL, TeleportAction)):
+                    continue
+                path = (*at.path, action.name)
+                reference = _reference(path, len(at.event.actions) == 1, names)
+                lateral = LateralAction(path, *reference, repeats, adds, steers)
+                for actor in actors:
+                    by_entity.setdefault(actor, {})[lateral] = None
+        return cls({entity: tuple(actions) for entity, actions in by_entity.items()}, frozenset(changing))
+
+
+def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> tuple[str, str]:
+    """By its own name where no other element has it, else by its event's, else by the whole path.
+
+    An action without a name, which the standard doesn't allow and some tools write, has only its event's.
+    """
+    if path[-1] and names[path[-1]] == 1:
+        return "action", path[-1]
+    if (is_alone or not path[-1]) and names[path[-2]] == 1:
+        return "event", path[-2]
+    return "action", "::".join(path)
+
+
+def _names(scenario: Scenario) -> Iterator[str]:
+    """Name of every element of the storyboard."""
+    for story in scenario.storyboard.stories:
+        yield story.name
+        for act in story.acts:
+            yield act.name
+            for group in act.maneuver_groups:
+                yield group.name
+                for maneuver in group.maneuvers:
+                    yield maneuver.name
+                    for event in maneuver.events:
+                        yield event.name
+                        yield from (action.name for action in event.actions)

@@ -15,8 +15,7 @@ from xosc_lateral.files.openscenario.declarations import NAMES, entry_scope, loc
 from xosc_lateral.files.openscenario.element import XmlElement, children_of, elements, local_name, parent_of
 from xosc_lateral.files.openscenario.write.draft import Draft, unchanged
 from xosc_lateral.files.openscenario.write.losses import Losses
-from xosc_lateral.world.scenario.expressions import ExpressionError
-from xosc_lateral.world.scenario.parameters import Scope
+from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.scenario import Scenario
 
 _REFERENCED_ELEMENTS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action"})

@@ -16,7 +16,8 @@ from xosc_lateral.base.errors import locate
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.entities import (
+from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
+from xosc_lateral.files.openscenario.write.replay import (
     add_kept_actions,
     dropped_reason,
     is_replaced,
@@ -24,14 +25,13 @@ from xosc_lateral.files.openscenario.write.entities import (
     remove_controllers,
     rewrite_init,
 )
-from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.world.motion.nominal import PlayedAction
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
-from xosc_lateral.world.scenario.dependence import actors_of, conditions_of, refers_to
+from xosc_lateral.world.scenario.dependence import refers_to
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario
+from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, actors_of, conditions_of
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from enum import IntFlag
 from functools import partial
 from typing import Any, TypeAlias
 
-from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.motion.nominal import Activity, PlayedAction
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import StoryboardElement
@@ -73,8 +74,9 @@ class RunningAction(StoryboardElement):
         """Start to act, and write it down."""
         if self.actor is not None:
             self.simulation.wake(self.actor)
-        actor = None if self.actor is None else self.actor.name
-        self._number = self.simulation.record_start(self.source, actor, self.path or ("Init",))
+        actor, path = None if self.actor is None else self.actor.name, self.path if self.parent else ("Init",)
+        self._number = len(self.simulation.played)
+        self.simulation.played.append(PlayedAction(self.source, actor, path, self.simulation.time, None))
         super().start()
         self._is_refused = False
         self._begin()
@@ -91,7 +93,8 @@ class RunningAction(StoryboardElement):
     def change(self, state: State, transition: State | None) -> None:
         """As any element; the end is written down."""
         if state is State.COMPLETE and self.is_running:
-            self.simulation.record_end(self._number)
+            played = self.simulation.played
+            played[self._number] = replace(played[self._number], end=self.simulation.stamp)
             self._finish()
         super().change(state, transition)
         if self.actor is not None:

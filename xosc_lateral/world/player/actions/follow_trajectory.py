@@ -34,15 +34,8 @@ class RunningFollowTrajectory(RunningPrivateAction):
         state, content = self.actor, self.content
         follow = content.following_mode is FollowingMode.FOLLOW
         before = state.plane
-        path = path_of(
-            content.trajectory,
-            self.simulation,
-            pose_of,
-            follower=state,
-            follow=follow,
-            speed=state.speed,
-            is_timed=self._is_timed,
-        )
+        timed, trajectory = self._is_timed, content.trajectory
+        path = path_of(trajectory, self.simulation, pose_of, follower=state, follow=follow, is_timed=timed)
         self._path = path
         if content.timing is not None and not self._is_timed:
             self.note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")

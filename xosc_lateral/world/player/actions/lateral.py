@@ -8,9 +8,9 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningToTarget
 from xosc_lateral.world.player.distances import is_turned
 from xosc_lateral.world.player.drive import move_along_lane
-from xosc_lateral.world.player.positions.resolve import beside
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON, Transition
+from xosc_lateral.world.road.lanes import beside
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction, LaneOffsetAction
 

@@ -9,20 +9,7 @@ from xosc_lateral.world.player.actions.speed_profile import limits_of
 from xosc_lateral.world.player.distances import Measure, ahead_and_left
 from xosc_lateral.world.player.drive import drive
 from xosc_lateral.world.player.transition import EPSILON, Transition
-from xosc_lateral.world.scenario.enums import (
-    CoordinateSystem,
-    DynamicsDimension,
-    LongitudinalDisplacement,
-    RelativeDistanceType,
-    SpeedTargetValueType,
-)
-from xosc_lateral.world.scenario.private_actions import (
-    AbsoluteTargetSpeed,
-    LongitudinalDistanceAction,
-    RelativeSpeedToMaster,
-    RelativeTargetSpeed,
-    SpeedAction,
-)
+from xosc_lateral.world.scenario import enums, private_actions
 
 
 class RunningSpeed(RunningToTarget):
@@ -34,14 +21,14 @@ class RunningSpeed(RunningToTarget):
     """
 
     domains = Domain.LONGITUDINAL
-    content: SpeedAction
+    content: private_actions.SpeedAction
 
     def _begin(self) -> None:
         state = self.actor
         self._reached = False
         self._transition = transition = Transition.of(self.content.dynamics)
         target = self._limited(self._target())
-        if transition.dimension is DynamicsDimension.DISTANCE:
+        if transition.dimension is enums.DynamicsDimension.DISTANCE:
             transition.range = duration_of(state.speed, self._target(), transition.range)
         transition.begin(state.speed, target)
         limits = state.entity.performance
@@ -66,7 +53,7 @@ class RunningSpeed(RunningToTarget):
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target(self) -> float:
         target = self.content.target
-        if self._reference is None or isinstance(target, AbsoluteTargetSpeed):
+        if self._reference is None or isinstance(target, private_actions.AbsoluteTargetSpeed):
             return target.value
         return relative_to(self._reference.speed, target)
 
@@ -98,9 +85,11 @@ class RunningSpeed(RunningToTarget):
         return speed
 
 
-def relative_to(speed: float, target: RelativeTargetSpeed | RelativeSpeedToMaster) -> float:
+def relative_to(
+    speed: float, target: private_actions.RelativeTargetSpeed | private_actions.RelativeSpeedToMaster
+) -> float:
     """What is asked for while the other entity has this speed. [m/s]"""
-    return speed + target.value if target.value_type is SpeedTargetValueType.DELTA else speed * target.value
+    return speed + target.value if target.value_type is enums.SpeedTargetValueType.DELTA else speed * target.value
 
 
 def duration_of(start: float, target: float, distance: float) -> float:
@@ -125,13 +114,13 @@ class RunningLongitudinalDistance(RunningPrivateAction):
     """At once without dynamic constraints, else a critically damped spring within them."""
 
     domains = Domain.LONGITUDINAL
-    content: LongitudinalDistanceAction
+    content: private_actions.LongitudinalDistanceAction
 
     def _prepare(self) -> None:
         self._measure = Measure(
             # with free space, the reference player measures in the own frame, whatever is asked for
-            (not self.content.freespace and self.content.coordinate_system) or CoordinateSystem.ENTITY,
-            RelativeDistanceType.LONGITUDINAL,
+            (not self.content.freespace and self.content.coordinate_system) or enums.CoordinateSystem.ENTITY,
+            enums.RelativeDistanceType.LONGITUDINAL,
             self.content.freespace,
         )
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
@@ -142,11 +131,11 @@ class RunningLongitudinalDistance(RunningPrivateAction):
         """Decide on which side of the other entity to stay: the first time, as in the reference player."""
         self._acceleration = 0.0
         displacement = self.content.displacement
-        if displacement is LongitudinalDisplacement.ANY and self._ahead is None:
+        if displacement is enums.LongitudinalDisplacement.ANY and self._ahead is None:
             self._ahead = self._is_ahead()
-        elif displacement is not LongitudinalDisplacement.ANY:
+        elif displacement is not enums.LongitudinalDisplacement.ANY:
             # None given: behind the other (the reference player's default; version 1.0 knows nothing else).
-            self._ahead = displacement is not LongitudinalDisplacement.LEADING
+            self._ahead = displacement is not enums.LongitudinalDisplacement.LEADING
         keeps = self.content.distance is None and self.content.time_gap is None
         self._kept = self._distance() if keeps else None
 
@@ -208,6 +197,6 @@ def _grown(rate: float, step: float) -> float:
 
 
 RUNNING: dict[type, Maker] = {
-    SpeedAction: RunningSpeed,
-    LongitudinalDistanceAction: RunningLongitudinalDistance,
+    private_actions.SpeedAction: RunningSpeed,
+    private_actions.LongitudinalDistanceAction: RunningLongitudinalDistance,
 }

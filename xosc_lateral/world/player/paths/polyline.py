@@ -159,10 +159,8 @@ def _constant_acceleration(speed: float, ds: float, dt: float) -> tuple[float, f
 
 
 def _lengths(corners: Sequence[Corner]) -> tuple[float, ...]:
-    lengths = [0.0]
-    for a, b in itertools.pairwise(corners):
-        lengths.append(lengths[-1] + hypot(b.x - a.x, b.y - a.y))
-    return tuple(lengths)
+    spans = (hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(corners))
+    return tuple(itertools.accumulate(spans, initial=0.0))
 
 
 def _tangents(corners: Sequence[Corner]) -> tuple[float, ...]:

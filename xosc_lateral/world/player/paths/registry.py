@@ -34,7 +34,6 @@ class Layout(Struct, frozen=True):
     place: Place
     follower: EntityState | None
     follow: bool
-    speed: float
     closes: bool
 
     def pose_of(self, position: positions.Position) -> Pose:
@@ -65,17 +64,19 @@ def _polyline(shape: positions.Polyline, layout: Layout) -> Path:
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
         layout.note(f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out")
-    return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
+    speed = 0.0 if layout.follower is None else layout.follower.speed
+    return PolylinePath(merged, follow=layout.follow, initial_speed=speed)
 
 
 def _corner(vertex: positions.Vertex, layout: Layout) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
     pose = layout.pose_of(position)
+    orientation = position if isinstance(position, positions.WorldPosition) else getattr(position, "orientation", None)
     heading, pitch, roll = (
-        own if given is not None else nan
-        for own, given in zip((pose.heading, pose.pitch, pose.roll), _given_angles(position), strict=True)
-    )
+        nan if getattr(orientation, angle[0], None) is None else getattr(pose, angle)
+        for angle in ("heading", "pitch", "roll")
+    )  # absolute or relative, where one is written; else the path's own
     if not _gives_height(position):
         pitch, roll = nan, nan
     elif roll != roll:
@@ -98,7 +99,12 @@ def _clothoid_spline(shape: positions.ClothoidSpline, layout: Layout) -> Path:
     for segment in shape.segments:
         x, y, heading = _start_of(segment, pieces, layout)
         begin, end, length = segment.curvature_start, segment.curvature_end, segment.length
-        _check_turning(begin, end, length, layout)
+        # one that makes an entity spin is a mistake in the file (and would take for ever to integrate)
+        if not (length >= 0.0 and max(abs(begin), abs(end)) * length <= MOST_TURNING):
+            raise layout.error(
+                f"a clothoid of {length:g} m with curvatures {begin:g} to {end:g} 1/m: needs a length of at least 0 m "
+                f"and less than {MOST_TURNING:g} rad of turning"
+            )
         pieces.append(TimedClothoid(x, y, heading, begin, end, length, _or_nan(segment.time_start)))
     return ClothoidPath(pieces, _or_nan(shape.time_end))
 
@@ -118,15 +124,6 @@ def _start_of(
     else:
         raise layout.error("the clothoid spline has no start")
     return x, y, heading + segment.h_offset
-
-
-def _check_turning(start: float, end: float, length: float, layout: Layout) -> None:
-    """A curvature that makes an entity spin is a mistake in the file (and would take for ever to integrate)."""
-    if not (length >= 0.0 and max(abs(start), abs(end)) * length <= MOST_TURNING):
-        raise layout.error(
-            f"a clothoid of {length:g} m with curvatures {start:g} to {end:g} 1/m: needs a length of at least 0 m and "
-            f"less than {MOST_TURNING:g} rad of turning"
-        )
 
 
 def _check_times(times: Sequence[float], what: str, layout: Layout) -> None:
@@ -169,7 +166,6 @@ def path_of(
     *,
     follower: EntityState | None = None,
     follow: bool = False,
-    speed: float = 0.0,
     is_timed: bool = False,
 ) -> Path:
     """A trajectory laid out in the world as it is now; `pose_of` tells where a position is.
@@ -180,7 +176,7 @@ def path_of(
     if isinstance(shape, Unsupported):
         raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
     closes = trajectory.closed and not is_timed
-    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, speed, closes)
+    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, closes)
     path = SHAPES[type(shape)](shape, layout)
     start, end = path.at(0.0), path.at(path.length)
     if closes and (gap := hypot(end.x - start.x, end.y - start.y)) > VERTEX_RADIUS:
@@ -201,12 +197,6 @@ def duration(shape: positions.Shape) -> float:
         times = [point.time for point in shape.control_points]
     start, end = (times[0], times[-1]) if times else (None, None)
     return 0.0 if start is None or end is None else end - start
-
-
-def _given_angles(position: positions.Position) -> tuple[float | None, float | None, float | None]:
-    """Heading, pitch and roll as written, absolute or relative; None: the path's own."""
-    orientation = position if isinstance(position, positions.WorldPosition) else getattr(position, "orientation", None)
-    return (None, None, None) if orientation is None else (orientation.h, orientation.p, orientation.r)
 
 
 def _gives_height(position: positions.Position) -> bool:

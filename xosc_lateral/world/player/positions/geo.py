@@ -36,7 +36,8 @@ def project(reference: str | None, latitude: float, longitude: float) -> tuple[f
         raise ProjectionError(
             "the road network has no geoReference with a PROJ string: geographic positions have no place"
         )
-    settings = _settings(reference)
+    words = (word[1:].partition("=") for word in reference.split() if word.startswith("+"))
+    settings = {key: value for key, _, value in words}
     try:
         return _project(settings, latitude, longitude)
     except ProjectionError:
@@ -52,7 +53,10 @@ def _project(settings: dict[str, str], latitude: float, longitude: float) -> tup
     if kind == "utm" and "zone" not in settings and {"lat_0", "lon_0"} <= settings.keys():
         kind = "tmerc"  # field maps name an origin of their own instead of a zone: it is the map's
     if kind == "utm":
-        settings |= _utm(settings)
+        # a zone of UTM as a transverse Mercator projection, by its definition
+        y_0 = _UTM_SOUTH if "south" in settings else 0.0
+        settings |= {"lon_0": str(6 * int(settings["zone"]) - 183), "lat_0": "0", "k": str(_UTM_SCALE)}
+        settings |= {"x_0": str(_UTM_EASTING), "y_0": str(y_0)}
     elif kind not in ("tmerc", "etmerc", "merc"):
         raise ProjectionError(
             f"projection '{kind}' of the road network's geoReference is not known (utm, tmerc, merc are)"
@@ -66,23 +70,6 @@ def _project(settings: dict[str, str], latitude: float, longitude: float) -> tup
         x, y = _transverse(latitude, longitude - lon_0, k)
         y_0 = _transverse(lat_0, 0.0, k)[1]
     return x + float(settings.get("x_0", "0")), y - y_0 + float(settings.get("y_0", "0"))
-
-
-def _utm(settings: dict[str, str]) -> dict[str, str]:
-    """A zone of UTM as a transverse Mercator projection, by its definition."""
-    zone = int(settings["zone"])
-    return {
-        "lon_0": str(6 * zone - 183),
-        "k": str(_UTM_SCALE),
-        "lat_0": "0",
-        "x_0": str(_UTM_EASTING),
-        "y_0": str(_UTM_SOUTH if "south" in settings else 0.0),
-    }
-
-
-def _settings(reference: str) -> dict[str, str]:
-    pairs = (word[1:].partition("=") for word in reference.split() if word.startswith("+"))
-    return {key: value for key, _, value in pairs}
 
 
 def _conformal_tangent(latitude: float) -> float:

@@ -12,6 +12,7 @@ from xosc_lateral.world.player.paths.registry import path_of
 from xosc_lateral.world.player.positions.geo import ProjectionError, project
 from xosc_lateral.world.player.simulation import Simulation
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, Placement, RouteGuide, free, guide, locate, world_pose
+from xosc_lateral.world.road.lanes import beside
 from xosc_lateral.world.road.positions import Pose, is_forward
 from xosc_lateral.world.scenario import position as positions
 from xosc_lateral.world.scenario.enums import ReferenceContext
@@ -123,14 +124,6 @@ def relative_lane_position(
     else:
         offset = position.offset * side
     return lane_placement(position, simulation, there.road, lane, there.s, offset, along_lane=along_lane)
-
-
-def beside(lane: int, lanes: int) -> int:
-    """The lane `lanes` further along +t; there is no lane 0 to drive on."""
-    target = lane + lanes
-    if lane != 0 and (target == 0 or (target > 0) != (lane > 0)):
-        target += 1 if lanes > 0 else -1
-    return target
 
 
 def relative_road_position(

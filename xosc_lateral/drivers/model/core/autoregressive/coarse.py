@@ -166,13 +166,13 @@ class Autoregression(Record, frozen=True, eq=False):
         return np.asarray(np.fft.irfft(power, GRID)[:n_lags])
 
 
-def stabilise(coefficients: FloatArray, largest: float = MAX_ROOT) -> FloatArray:
-    """Coefficients [-], shape (order,), whose roots lie within a modulus (0 to 1): others are pulled in radially."""
+def stabilise(coefficients: FloatArray) -> FloatArray:
+    """Coefficients [-], shape (order,), whose roots lie within `MAX_ROOT`: others are pulled in radially."""
     roots = _roots(coefficients)
     modulus = np.abs(roots)
-    if modulus.max(initial=0.0) <= largest:
+    if modulus.max(initial=0.0) <= MAX_ROOT:
         return coefficients
-    pulled = np.where(modulus > largest, roots * (largest / np.maximum(modulus, 1e-300)), roots)
+    pulled = np.where(modulus > MAX_ROOT, roots * (MAX_ROOT / np.maximum(modulus, 1e-300)), roots)
     return np.asarray(-np.real(np.poly(pulled))[1:])
 
 

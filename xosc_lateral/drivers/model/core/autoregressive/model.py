@@ -57,38 +57,15 @@ class AutoregressiveState(msgspec.Struct):
     factors: FactorState
     coarse: CoarseState
     fine: FineState
+    # Where bending begins (and, in `limits`, ends), on the lower and on the upper side, shape (2, drivers). [-]
     knees: FloatArray
-    """Where bending begins (and, in `limits`, ends), on the lower and on the upper side, shape (2, drivers). [-]"""
     limits: FloatArray
-    clock: ClockState
-    """Of the coarse part."""
-    single: bool = True
-    """One driver, arrays without an axis of drivers."""
+    clock: ClockState  # Of the coarse part.
+    single: bool = True  # One driver, arrays without an axis of drivers.
 
 
 class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=True):
-    """Parameters of the model, and what follows from them.
-
-    Raises `DriverProfileError` if a number is out of its range.
-
-    Parameters
-    ----------
-    mean : float
-        Mean offset of all drivers. [lane widths]
-    between_drivers : float
-        Standard deviation of the drivers' means. [lane widths]
-    limits : tuple of float
-        Coarse movement bends back before these: the range of the data, the markings at most. [lane widths]
-    coarse : Autoregression
-        Of the coarse movement about the driver's mean, one step a second. [lane widths]
-    fine : ShapedNoise
-        Damping of the fine noise. [lane widths]
-    coarse_volatility, fine_volatility : Volatility
-    correlation : float
-        Between the logarithms of the two factors. [-]
-    step : float
-        [s]
-    """
+    """Parameters of the model; raises `DriverProfileError` if a number is out of its range."""
 
     State: ClassVar[type] = AutoregressiveState
     fine_scales_with_lane: ClassVar[bool] = False

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import isfinite
+from typing import Annotated
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, Autoregression, building_low_pass
-from xosc_lateral.drivers.model.core.base import CoreModel, Start
-from xosc_lateral.drivers.model.core.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
 from xosc_lateral.drivers.model.records import Record
 
 START_LAGS = 300
@@ -26,17 +27,18 @@ START_LAGS = 300
 
 
 class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
-    """What `AutoregressiveModel` says of its fields, and what follows from them."""
+    """Fields of `AutoregressiveModel`, and what follows from them."""
 
-    mean: float
-    between_drivers: float
-    limits: tuple[float, float]
-    coarse: Autoregression
-    fine: ShapedNoise
+    mean: Annotated[float, Meta(description="Mean offset of all drivers. [lane widths]")]
+    between_drivers: Annotated[float, Meta(description="Deviation of the drivers' means. [lane widths]")]
+    # The range of the data, or where movement is seldom held, the markings at most.
+    limits: Annotated[tuple[float, float], Meta(description="Coarse movement bends back before. [lane widths]")]
+    coarse: Autoregression  # Of the coarse movement about the driver's mean, one step a second. [lane widths]
+    fine: ShapedNoise  # [lane widths]
     coarse_volatility: Volatility
     fine_volatility: Volatility
-    correlation: float
-    step: float = STEP
+    correlation: Annotated[float, Meta(description="Between the logarithms of the two factors. [-]")]
+    step: Annotated[float, Meta(description="[s]")] = STEP
 
     def __post_init__(self) -> None:
         low, high = self.limits
@@ -111,20 +113,16 @@ def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.r
     coarse_variance = (start.spread * coarse) ** 2 * model.coarse_covariance[0]
     moving = coarse_variance + (start.fine * fine) ** 2 * model.fine_covariance[0]
     away = np.broadcast_to(np.asarray(start.rel_offset) - model.mean, n)
-    weight = np.cumsum(_likelihood(away[:, None], between + moving), axis=1)
+    variance = between + moving
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a normal variable, relative to the likeliest candidate's
+        log_weight = -0.5 * np.log(variance) - 0.5 * away[:, None] ** 2 / variance
+        relative = np.nan_to_num(log_weight - log_weight.max(axis=1, keepdims=True), nan=0.0)
+    weight = np.cumsum(np.exp(relative), axis=1)
     k = np.sum(weight < weight[:, -1:] * choice[:, None], axis=1)
     rows = np.arange(n)
     share = between / (between + moving[rows, k]) if between > 0.0 else np.zeros(n)
     mean = model.mean + share * away + np.sqrt(between * (1.0 - share)) * mean_normal
     return DriverState(mean, coarse[rows, k], fine[rows, k])
-
-
-def _likelihood(away: FloatArray, variance: FloatArray) -> FloatArray:
-    """Of a normal variable, relative to the likeliest candidate's; shape of `variance`."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        log_weight = -0.5 * np.log(variance) - 0.5 * away**2 / variance
-        relative = np.nan_to_num(log_weight - log_weight.max(axis=1, keepdims=True), nan=0.0)
-    return np.asarray(np.exp(relative))
 
 
 def _factor(variance: float, normal: FloatArray) -> FloatArray:
@@ -149,8 +147,8 @@ class Volatility(Record, frozen=True):
 
     between: float = 0.0
     within: float = 0.0
+    # Of the part that varies within seconds; of the slow one it is `SLOW_CORRELATION_TIME`. [s]
     correlation_time: float = msgspec.field(name="memory", default=10.0)
-    """Of the part that varies within seconds; of the slow one it is `SLOW_CORRELATION_TIME`. [s]"""
     slow: float = 0.0
 
     def __post_init__(self) -> None:

@@ -112,10 +112,8 @@ class QueueState(msgspec.Struct):
     """Values at 5 Hz that were made and not yet taken, shape (k, drivers). [lane widths]"""
 
     made: FloatArray
-    skip: IntArray
-    """Rows of it that each driver leaves out before his next, shape (drivers,)."""
-    bridge: FloatArray
-    """What is still added to meet a start, step by step, shape (k, drivers). [lane widths]"""
+    skip: IntArray  # Rows of it that each driver leaves out before his next, shape (drivers,).
+    bridge: FloatArray  # What is still added to meet a start, step by step, shape (k, drivers). [lane widths]
 
 
 class CoarseState(QueueState):

@@ -134,39 +134,24 @@ def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AliasTable:
-    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_."""
+    """A chain made ready for sampling: one uniform number and two look-ups per step [2]_."""
 
     n_bins: int
+    # Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ...
     keep: FloatArray
-    """Shape (n_bins * n_bins,). Column k of row i stands for bin k below this fraction of its width ..."""
-    other: IntArray
-    """Shape (n_bins * n_bins,). ... and for this bin above it."""
+    other: IntArray  # Shape (n_bins * n_bins,). ... and for this bin above it.
 
     @classmethod
     def of(cls, transition: FloatArray) -> AliasTable:
         """Build from rows of probabilities [-], shape (n_bins, n_bins), each summing to 1."""
-        rows = [_alias_row(row) for row in transition]
-        keep = np.concatenate([row[0] for row in rows])
-        other = np.concatenate([row[1] for row in rows])
-        return cls(len(transition), keep, other)
+        keep, other = zip(*map(_alias_row, transition), strict=True)
+        return cls(len(transition), np.concatenate(keep), np.concatenate(other))
 
 
 def _alias_row(probabilities: FloatArray) -> tuple[FloatArray, IntArray]:
+    """What each bin lacks of 1 filled from one that has more: Vose's algorithm [3]_."""
     n = len(probabilities)
     keep, other = (probabilities * n).tolist(), list(range(n))
-    _paired(keep, other)
-    # A bin of probability 0 that rounding left alone must not be drawn.
-    likely = int(np.argmax(probabilities))
-    for k in range(n):
-        if probabilities[k] == 0.0:
-            other[k] = likely if other[k] == k else other[k]
-            keep[k] = 0.0
-    return np.array(keep), np.array(other, dtype=np.int64)
-
-
-def _paired(keep: list[float], other: list[int]) -> None:
-    """Fill what each bin lacks of 1 from one that has more: Vose's algorithm [2]_, in place."""
-    n = len(keep)
     small = [k for k in range(n) if keep[k] < 1.0]
     large = [k for k in range(n) if keep[k] >= 1.0]
     while small and large:
@@ -177,3 +162,10 @@ def _paired(keep: list[float], other: list[int]) -> None:
             small.append(large.pop())
     for k in small + large:  # what is left differs from 1 by rounding
         keep[k] = 1.0
+    # A bin of probability 0 that rounding left alone must not be drawn.
+    likely = int(np.argmax(probabilities))
+    for k in range(n):
+        if probabilities[k] == 0.0:
+            other[k] = likely if other[k] == k else other[k]
+            keep[k] = 0.0
+    return np.array(keep), np.array(other, dtype=np.int64)

@@ -12,16 +12,24 @@ from __future__ import annotations
 
 from copy import deepcopy
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.model.core.base import ClockState, CoreModel, Start, take_at_rate
-from xosc_lateral.drivers.model.core.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise
+from xosc_lateral.drivers.model.core.base import (
+    KERNEL_TAPS,
+    N_KNOTS,
+    ClockState,
+    CoreModel,
+    ShapedNoise,
+    Start,
+    take_at_rate,
+)
 from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, AliasTable, MarkovChain, bin_of
 from xosc_lateral.drivers.model.linear_filters import JitKernel, convolve
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
@@ -29,36 +37,18 @@ from xosc_lateral.drivers.model.seeds import TwoLevelSeed, generator
 
 
 class TwoLevelSettings(Record, frozen=True):
-    """Constants of the model, each above 0; the defaults are the paper's.
+    """Constants of the model, each above 0; the defaults are the paper's."""
 
-    Parameters
-    ----------
-    n_bins : int
-        Bins of the relative offset over [-0.5, 0.5].
-    smoothing_sigma, smoothing_support : float
-        Standard deviation of the Gaussian that smooths the chain's step function, and the distance to both sides at
-        which it is cut off. [s]
-    fine_cap : float
-        The measured fine part is capped at plus and minus this. [lane widths]
-    n_knots : int
-        Knots of the piecewise linear damping function. (The paper shows a figure, no count.)
-    n_taps : int
-        Length of the kernel of the fine noise, odd. (The paper gives none: one snippet.)
-    start_fade : float
-        A drive that has to start at a given offset meets it exactly; what the smoothed chain lacks to it fades out
-        within this time. (The paper's starts in the right bin.) [s]
-    step : float
-        [s]
-    """
-
-    n_bins: int = N_BINS
-    smoothing_sigma: float = 0.6
-    smoothing_support: float = 1.0
-    fine_cap: float = 0.03
-    n_knots: int = N_KNOTS
-    n_taps: int = KERNEL_TAPS
-    start_fade: float = 1.0
-    step: float = STEP
+    n_bins: Annotated[int, Meta(description="Bins of the relative offset over [-0.5, 0.5].")] = N_BINS
+    smoothing_sigma: Annotated[float, Meta(description="Of the Gaussian that smooths the chain. [s]")] = 0.6
+    smoothing_support: Annotated[float, Meta(description="Distance at which it is cut off. [s]")] = 1.0
+    fine_cap: Annotated[float, Meta(description="Of the measured fine part, to both sides. [lane widths]")] = 0.03
+    # The paper shows a figure, no count, and for the kernel no length: one snippet.
+    n_knots: Annotated[int, Meta(description="Of the piecewise linear damping function.")] = N_KNOTS
+    n_taps: Annotated[int, Meta(description="Length of the kernel of the fine noise, odd.")] = KERNEL_TAPS
+    # A drive that has to start at a given offset meets it exactly; the paper's starts in the right bin.
+    start_fade: Annotated[float, Meta(description="Time in which what a start lacked fades out. [s]")] = 1.0
+    step: Annotated[float, Meta(description="[s]")] = STEP
 
     def __post_init__(self) -> None:
         for name in self.__struct_fields__:
@@ -87,32 +77,20 @@ class TwoLevelState(msgspec.Struct):
 
     chain: np.random.Generator
     noise: np.random.Generator
-    bins: IntArray
-    """Last bin, shape (drivers,)."""
-    levels: FloatArray
-    """Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]"""
-    white: FloatArray
-    """Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]"""
-    fade: FloatArray
-    """What is still added to meet a start, step by step, shape (k, drivers). [-]"""
-    clock: ClockState
-    """Of the coarse part."""
-    single: bool = True
-    """One driver, arrays without an axis of drivers."""
+    bins: IntArray  # Last bin, shape (drivers,).
+    levels: FloatArray  # Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]
+    white: FloatArray  # Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]
+    fade: FloatArray  # What is still added to meet a start, step by step, shape (k, drivers). [-]
+    clock: ClockState  # Of the coarse part.
+    single: bool = True  # One driver, arrays without an axis of drivers.
 
 
 class TwoLevelModel(CoreModel, frozen=True, eq=False, dict=True):
-    """Fitted two-level model: x = kappa + phi.
+    """Fitted two-level model, x = kappa + phi.
 
-    Raises `DriverProfileError` if counts and settings disagree, or counts or damping are none.
-
-    Parameters
-    ----------
-    settings : TwoLevelSettings
-    counts : array of int, shape (n_bins, n_bins)
-        Transitions of the coarse part before smoothing, from the row's bin to the column's in one step.
-    damping : array, shape (n_knots,)
-        Of the fine part's noise, at frequencies evenly spaced from 0 to half the sampling rate. [lane widths]
+    `counts`: transitions of kappa before smoothing, from the row's bin to the column's in one step; `damping` of phi's
+    noise, at frequencies evenly spaced from 0 to half the sampling rate [lane widths]. Raises `DriverProfileError` if
+    counts and settings disagree, or counts or damping are none.
     """
 
     State: ClassVar[type] = TwoLevelState
@@ -169,7 +147,9 @@ class TwoLevelModel(CoreModel, frozen=True, eq=False, dict=True):
         stream = TwoLevelStream(self, state)
         state.levels = np.concatenate([state.levels, stream.walk(half - 1)])
         if start is not None:
-            state.fade = self.settings.fade_out[:, None] * _lack(stream, start)
+            coarse, fine = deepcopy(stream).take(1)
+            unscaled = (start.rel_offset - stream.mean - start.fine * fine[0]) / start.spread
+            state.fade = self.settings.fade_out[:, None] * np.atleast_1d(stream.mean + unscaled - coarse[0])
         return stream
 
     def resume(self, state: TwoLevelState) -> TwoLevelStream:
@@ -220,13 +200,6 @@ def _first_bins(model: TwoLevelModel, seed: np.random.SeedSequence, start: Start
         return generator(seed, TwoLevelSeed.FIRST_BIN).choice(model.chain.n_bins, size=m, p=model.chain.stationary)
     within = model.mean + (np.asarray(start.rel_offset) - model.mean) / start.spread
     return np.broadcast_to(bin_of(within, model.chain.n_bins), m).copy()
-
-
-def _lack(stream: TwoLevelStream, start: Start) -> FloatArray:
-    """What the coarse part lacks at the first step to start as asked for, shape (drivers,) or (1,). [-]"""
-    coarse, fine = deepcopy(stream).take(1)
-    unscaled = (start.rel_offset - stream.mean - start.fine * fine[0]) / start.spread
-    return np.atleast_1d(stream.mean + unscaled - coarse[0])
 
 
 def _walk_body(uniform, drivers, n_bins, keep, other, states):  # type: ignore[no-untyped-def]

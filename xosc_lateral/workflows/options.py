@@ -1,12 +1,17 @@
-"""How users say a setting: in Python, as a word of the command line, in a cell of a table, in the configuration."""
+"""How users say a setting: in Python, as a word of the command line, in a cell of a table, in the configuration.
+
+It is declared where it is used: as a field of settings (`option`), or in the annotation of a call's keyword (`flag`).
+"""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import json
 import math
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -19,6 +24,9 @@ PathLike: TypeAlias = str | Path
 ProfileLike: TypeAlias = "PathLike | DriverProfile"
 """A profile, its path, or its name in the library."""
 Paths: TypeAlias = PathLike | Sequence[PathLike]
+
+STEP = 0.02
+"""Of playback, as in the reference logs. [s]"""
 
 NO_EGO = "none"
 """In place of a vehicle under test: there is none."""
@@ -36,7 +44,7 @@ class Option:
     - `read`: what they say in Python, a word of the command line or a cell of a table -> the field's value, or
       `ValueError`
     - `flags`: on the command line; empty: its name
-    - `kind`: type of the command line's value; None: several verbs share the option, and `cli.words` has it
+    - `kind`: type of the command line's value; None: that of a call's keyword, or several verbs share it (`SHARED`)
     - `words`: what else the command line says of it (help, limits)
     - `cell`: reads the column of its name; None: a table has no such column
     - `prefix`, `entry`: of columns that hold one entry each of a mapping
@@ -87,14 +95,48 @@ def option(
     return field(default=default, metadata=metadata)
 
 
+def flag(*flags: str, kind: Any = None, read: Callable[[Any], Any] = lambda stated: stated, **words: Any) -> Option:
+    """What the command line says of a call's keyword, in its annotation: ``Annotated[float, flag(help=...)]``."""
+    return Option(read, flags, kind, words)
+
+
+def declare_options(call: Verb) -> Verb:
+    """Take what annotations say of keywords for the command line; what the docstring lacks is said by their help.
+
+    Keywords of a name in `SHARED` need no annotation where they have a default.
+    """
+    options, entries = dict[str, Option](), list[str]()
+    documented, globals_ = inspect.cleandoc(call.__doc__ or ""), call.__globals__
+    for name, parameter in inspect.signature(call).parameters.items():
+        kind = parameter.annotation
+        option = SHARED.get(name) if parameter.default is not parameter.empty else None
+        if kind.startswith("Annotated["):
+            kind, metadata = map(ast.unparse, ast.parse(kind, mode="eval").body.slice.elts)
+            call.__annotations__[name], option = kind, eval(metadata, globals_)
+        if option is None:
+            continue
+        options[name] = option if option.kind is not None else replace(option, kind=eval(kind, globals_))
+        if not re.search(rf"^(\w+, )*{name}(, \w+)*( :|$)", documented, flags=re.MULTILINE):
+            text = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
+            entries.append(f"{name} : {kind}\n    {text}")
+    sections = re.split(r"\n\n(?=\w+\n---)", documented)
+    if len(sections) == 1 or not sections[1].startswith("Parameters"):
+        sections.insert(1, "Parameters\n----------")
+    sections[1] = "\n".join([sections[1], *entries])
+    call.__doc__, call.__options__ = "\n\n".join(sections), options  # type: ignore[attr-defined]
+    return call
+
+
 def settable(settings: type) -> list[Field[Any]]:
     """The fields of some settings that users can set."""
     return [item for item in fields(settings) if "option" in item.metadata]
 
 
-def options_of(settings: type) -> dict[str, Option]:
-    """What users can set of some settings, by name."""
-    return {item.name: item.metadata["option"] for item in settable(settings)}
+def options_of(source: Callable[..., Any]) -> dict[str, Option]:
+    """What users can set of some settings, or of a call, by name."""
+    if isinstance(source, type):
+        return {item.name: item.metadata["option"] for item in settable(source)}
+    return dict(source.__options__)  # type: ignore[attr-defined]
 
 
 def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
@@ -246,3 +288,33 @@ def json_object(text: str, _folder: Path) -> dict[str, str]:
     if not isinstance(values, dict):
         raise ValueError(f"{text!r} is not a JSON object")
     return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
+
+
+class Part(StrEnum):
+    """Parts of a profile that are left out unless asked for."""
+
+    SENSOR = "sensor"
+
+
+PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
+
+# fmt: off
+SHARED: Mapping[str, Option] = {
+    "profile": PROFILE,
+    "seed": flag(kind=int, min=0, help="Random seed; the same inputs and seed give the same bytes."),
+    "columns": flag(kind=object, help="Standard name -> foreign header with its unit, or a saved mapping."),
+    "library": flag(kind=list[Path] | None, metavar="FOLDER", help="Folder with more profiles; may be repeated."),
+    "parameters": flag("--set", kind=list[str] | None, read=texts, metavar="NAME=VALUE",
+        help="Set a scenario parameter; may be repeated."),
+    "allow": flag(kind=list[Path] | None,
+        help="Folder that roads and catalogs may be read from; may be repeated."),
+    "road": flag("--road", kind=Path | None, show_default=False, help="OpenDRIVE file, whatever the scenario says."),
+    "road_path": flag("--road-path", kind=list[Path] | None, metavar="DIR",
+        help='Folder with roads known by name ("Town04"); may be repeated.'),
+    "time_limit": flag(kind=float | None, read=seconds, min=0.1, max=86_400, show_default=False,
+        help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one."),
+    "with_sensor": flag("--with", kind=list[Part] | None, read=bool,
+        help="sensor: add the error of the sensor that measured the drives."),
+}
+# fmt: on
+"""What several verbs can be told, by the name that it has in all of them."""
