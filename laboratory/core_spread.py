@@ -23,7 +23,6 @@ from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive
 from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coarse
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
@@ -64,7 +63,7 @@ def calm_moments(seconds: float) -> Fit:
             normal, right = 1e-9 * np.eye(order), np.zeros(order)
             for past, value in zip(pasts, nexts, strict=True):
                 everywhere = np.ones(len(value), dtype=np.bool_)
-                weight = 1.0 / local_mean((value - past @ coefficients) ** 2, everywhere, seconds, STEP)
+                weight = 1.0 / local_mean((value - past @ coefficients) ** 2, everywhere, seconds)
                 normal += (past * weight[:, None]).T @ past
                 right += (past * weight[:, None]).T @ value
             coefficients = np.linalg.solve(normal, right)
@@ -89,7 +88,7 @@ VARIANTS: dict[str, Fit] = {
 def bands(rel_offset: FloatArray, timeline: Timeline) -> FloatArray:
     """Standard deviation of the offset, and of its movement between averaging times, shape (2 + len(TIMES),). [-]"""
     valid = timeline.valid
-    levels = [rel_offset, *(local_mean(rel_offset, valid, seconds, STEP) for seconds in TIMES)]
+    levels = [rel_offset, *(local_mean(rel_offset, valid, seconds) for seconds in TIMES)]
     inside = [level[valid] for level in levels]
     return np.array([inside[0].std(), *(np.std(a - b) for a, b in pairwise(inside)), inside[-1].std()])
 

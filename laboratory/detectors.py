@@ -31,7 +31,7 @@ from laboratory.detector_table import (
 )
 from laboratory.markers import show
 from laboratory.shortcut import played_variants, shortcut_lines
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.detectors import RULES, LateralSpeed
 from xosc_lateral.workflows.detection.logistic import train

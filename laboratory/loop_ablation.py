@@ -24,11 +24,10 @@ from tests.kit.simulated import preview_driver
 from xosc_lateral.drivers.loop import (
     candidates,
     column_search,
+    columns,
     dictionary,
-    feedback,
     model,
     refinement,
-    regression,
     selection,
 )
 from xosc_lateral.drivers.loop.dictionary import Search
@@ -75,7 +74,7 @@ def without_kinds(*kinds: type) -> list[Any]:
 
 PARTS: dict[str, Callable[[], list[Any]]] = {
     "the whole": lambda: [],
-    "3 cm of noise": lambda: [patch.object(regression, "MEASUREMENT_NOISE", 0.0)],
+    "3 cm of noise": lambda: [patch.object(model, "MEASUREMENT_NOISE", 0.0)],
     "responses smoothed as seen": lambda: [patch.object(model, "smoothed_as_seen", lambda moved, seen, *rest: seen)],
     "slow spread": lambda: without_kinds(SlowSpreadTerm),
     "second look at what acts": lambda: [patch.object(column_search, "ROUNDS", 1)],
@@ -87,9 +86,9 @@ PARTS: dict[str, Callable[[], list[Any]]] = {
         patch.object(candidates, "_curves", lambda column, values: []),
     ],
     "what a column may do, beside time": lambda: [patch.object(spread, "MAY_ACT", 0.0)],
-    "direction of time": lambda: [patch.object(feedback, "_predicted_share", lambda values, moved, rows: 0.0)],
+    "direction of time": lambda: [patch.object(columns, "_predicted_share", lambda values, moved, rows: 0.0)],
     "bias of short drives": lambda: [
-        patch.object(regression, "unbiased", lambda process, *rest, **more: process),
+        patch.object(model, "unbiased", lambda process, *rest, **more: process),
     ],
 }
 SHORT_ONLY = frozenset({"bias of short drives"})

@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t
 
-from xosc_lateral.drivers.loop.cross_validation import held_out_gain
-from xosc_lateral.drivers.loop.identify import identify
-from xosc_lateral.drivers.loop.model import Term
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.identify import held_out_gain, identify
+from xosc_lateral.drivers.loop.model import Term, fit_model
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
 from xosc_lateral.files.drives import read_drives
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from laboratory.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change
+from laboratory.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change, lane_id
 from xosc_lateral.files.templates.template import Bend, Motorway, Straight
 
 GAP = 35.0
@@ -24,7 +24,7 @@ def write(folder: Path, number: int, seconds: float, speeds: Sequence[float] = (
         for k, lane in enumerate(lanes)
     )
     steps = tuple(
-        PlannedEvent(f"Car{k}", f"Change{k}", lane_change(motorway.lane(1), 5), at_time(round(5.0 + 0.05 * k, 2)))
+        PlannedEvent(f"Car{k}", f"Change{k}", lane_change(lane_id(motorway, 1), 5), at_time(round(5.0 + 0.05 * k, 2)))
         for k in range(0, number, 10)
         if len(speeds) > 1 and lanes[k] != 1
     )

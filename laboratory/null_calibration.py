@@ -23,7 +23,7 @@ from laboratory.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.drivers.loop import significance
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000

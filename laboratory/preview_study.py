@@ -28,10 +28,9 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.drivers.loop.close import close_loop
 from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
 from xosc_lateral.drivers.loop.identify import name_time_beside, usable_columns
-from xosc_lateral.drivers.loop.model import CLIP
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import CLIP, fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, select
-from xosc_lateral.drivers.loop.terms.course import RESPONSE_S, CourseTerm
+from xosc_lateral.drivers.loop.terms.mean import RESPONSE_S, CourseTerm
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.files.drives import drives_of_table
 

@@ -34,7 +34,7 @@ from tests.kit.scenario_files import (
     teleport,
     time_condition,
 )
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.surroundings.moment import Places
 

@@ -15,6 +15,12 @@ from xosc_lateral.files.templates.template import FIXED_DATE, ROAD, Motorway, do
 Value = float | str
 
 
+def lane_id(motorway: Motorway, index: int) -> int:
+    """OpenDRIVE id of a driving lane; 0 is the slow lane beside the hard shoulder."""
+    number = motorway.lanes - index
+    return number if motorway.left_hand else -number
+
+
 class Vehicle(Enum):
     """What drives: model name (of CARLA's library, so that its ScenarioRunner finds it), category, size."""
 
@@ -144,7 +150,7 @@ class Plot:
 
         init = xosc.Init()
         for actor in self.actors:
-            place = xosc.LanePosition(actor.s, 0, self.motorway.lane(actor.lane), ROAD)
+            place = xosc.LanePosition(actor.s, 0, lane_id(self.motorway, actor.lane), ROAD)
             init.add_init_action(actor.name, xosc.TeleportAction(place))
             init.add_init_action(actor.name, speed_action(actor.speed))
         board = xosc.StoryBoard(init, at_time(self.duration, point="stop"))

@@ -12,8 +12,9 @@ def test_the_table_has_every_limit_and_context() -> None:
     assert all(f"\n| {name} | " in table for name in CONTEXT_RANGES)
 
 
-def test_every_standard_context_has_a_range() -> None:
-    assert set(CONTEXT_RANGES) == set(CONTEXT_UNITS)
+def test_a_context_has_its_unit_beside_its_range() -> None:
+    assert CONTEXT_UNITS["lead_distance"] == CONTEXT_UNITS["lane_width"] == "m" and CONTEXT_UNITS["is_truck"] == "-"
+    assert (CONTEXT_UNITS["rain"], CONTEXT_UNITS["grade"], CONTEXT_UNITS["wind_direction"]) == ("mm/h", "%", "deg")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.profiles.profiles import add_profile
 

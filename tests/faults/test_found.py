@@ -18,7 +18,7 @@ from tests.faults.readers import manifest_row
 from tests.kit.profiles import simulated_profile
 from tests.kit.scenario_files import scenario_text, write_scenario
 from xosc_lateral import write_template
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.files.output_tables import csv_text

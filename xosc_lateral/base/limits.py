@@ -13,24 +13,12 @@ from types import MappingProxyType
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A number that nothing may exceed.
-
-    Parameters
-    ----------
-    value : float
-        The largest that is taken.
-    unit : str
-        "MB" counts a million bytes; empty for a count.
-    what : str
-        What is counted, as in "bytes of a file".
-    reason : str
-        Why it is where it is.
-    """
+    """A number that nothing may exceed."""
 
     value: float
-    unit: str
-    what: str
-    reason: str
+    unit: str  # "MB" counts a million bytes; empty for a count
+    what: str  # is counted, as in "bytes of a file"
+    reason: str  # why it is where it is
 
     def __str__(self) -> str:
         return self._with_unit(self.value)
@@ -82,57 +70,46 @@ JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a mi
 LIVE_PAUSE = Limit(60, "s", "time between two steps of a running simulation", "300 steps of a driver: a second or two")
 LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")
 
-OFFSET_LANES = Limit(
-    1.5,
-    "",
-    "lane widths between an offset and the lane centre",
-    "at 1 it follows the next lane",
-)
+OFFSET_LANES = Limit(1.5, "", "lane widths between an offset and the lane centre", "at 1 it follows the next lane")
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What a quantity of the real world can be.
-
-    Parameters
-    ----------
-    low, high : float
-        Both included.
-    reason : str
-    """
+    """What a quantity of the real world can be, both borders included."""
 
     low: float
     high: float
     reason: str
+    unit: str = "-"
 
 
 CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
     {
-        "speed": Range(-50, 150, "540 km/h; cars reverse more slowly than that"),
-        "acceleration": Range(-100, 100, "10 g; a car brakes with 1 g"),
-        "curvature": Range(-1, 1, "a radius of 1 m; cars turn in 5 m"),
-        "lane_width": Range(0, 20, "the widest toll plaza lane; 0 where a lane begins"),
+        "speed": Range(-50, 150, "540 km/h; cars reverse more slowly than that", "m/s"),
+        "acceleration": Range(-100, 100, "10 g; a car brakes with 1 g", "m/s2"),
+        "curvature": Range(-1, 1, "a radius of 1 m; cars turn in 5 m", "1/m"),
+        "lane_width": Range(0, 20, "the widest toll plaza lane; 0 where a lane begins", "m"),
         "lane_index": Range(-1, 50, "lanes of one direction; -1: none"),
         "lane_count": Range(0, 50, "lanes of one direction"),
-        "crossfall": Range(-100, 100, "45 degrees"),
-        "grade": Range(-100, 100, "45 degrees"),
-        "lead_distance": Range(-100, 1e5, "overlapping by a road train's length, to 100 km"),
+        "crossfall": Range(-100, 100, "45 degrees", "%"),
+        "grade": Range(-100, 100, "45 degrees", "%"),
+        "lead_distance": Range(-100, 1e5, "overlapping by a road train's length, to 100 km", "m"),
         "is_truck": Range(0, 1, "a truth value"),
         "lead_is_truck": Range(0, 1, "a truth value"),
-        "left_distance": Range(-1e5, 1e5, "100 km"),
-        "right_distance": Range(-1e5, 1e5, "100 km"),
+        "left_distance": Range(-1e5, 1e5, "100 km", "m"),
+        "right_distance": Range(-1e5, 1e5, "100 km", "m"),
         "left_is_truck": Range(0, 1, "a truth value"),
         "right_is_truck": Range(0, 1, "a truth value"),
-        "oncoming_distance": Range(-1e5, 1e5, "100 km"),
-        "time_of_day": Range(0, 24, "hours of a day"),
-        "rain": Range(0, 2000, "the most ever measured in a minute: 1870 mm/h (Guadeloupe 1970)"),
-        "wind_speed": Range(0, 150, "the strongest gust ever measured: 113 m/s (Barrow Island 1996)"),
-        "wind_direction": Range(-360, 720, "a circle, either way"),
+        "oncoming_distance": Range(-1e5, 1e5, "100 km", "m"),
+        "time_of_day": Range(0, 24, "hours of a day", "h"),
+        "rain": Range(0, 2000, "the most ever measured in a minute: 1870 mm/h (Guadeloupe 1970)", "mm/h"),
+        "wind_speed": Range(0, 150, "the strongest gust ever measured: 113 m/s (Barrow Island 1996)", "m/s"),
+        "wind_direction": Range(-360, 720, "a circle, either way", "deg"),
         "friction": Range(0, 3, "racing tyres: 2"),
-        "illuminance": Range(0, 200_000, "the sun in the zenith: 130 000 lx"),
+        "illuminance": Range(0, 200_000, "the sun in the zenith: 130 000 lx", "lx"),
     }
 )
-"""Context by its names, in the units of `segment.CONTEXT_UNITS`."""
+"""Contexts that a scenario can supply by itself, by their names."""
 
 DISTANCES = frozenset({"lead_distance", "left_distance", "right_distance"})
 """To vehicles in lanes; infinite where a lane has nobody in it."""

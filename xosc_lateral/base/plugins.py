@@ -1,4 +1,4 @@
-"""What is found instead of listed: other packages' entry points, and what modules of a package define."""
+"""What is found, not listed: shipped files, other packages' entry points, what modules of a package define."""
 
 from __future__ import annotations
 
@@ -36,13 +36,7 @@ def _any_offered(folders: tuple[str, ...]) -> bool:
 
 @lru_cache(maxsize=len(GROUPS))
 def plugins(group: str) -> dict[str, Any]:
-    """Everything that installed packages offer in a group, by its name; loaded once.
-
-    Raises
-    ------
-    Exception
-        Whatever the import of a broken plug-in raises: it is that package's bug, and its traceback names it.
-    """
+    """All that installed packages offer in a group, by name; loaded once. A broken one raises, traceback and all."""
     return {point.name: point.load() for point in sorted(entry_points(group=group), key=lambda point: point.name)}
 
 
@@ -56,16 +50,9 @@ T = TypeVar("T")
 
 
 def defined_in(package: str, kind: type[T]) -> tuple[type[T], ...]:
-    """Classes of a kind that a package's modules define and that can be made.
+    """Public classes of a kind that modules of a package, imported already or being so, define and that can be made.
 
     Ordered by the names of the modules, then as written there: the same on every machine, however folders are listed.
-
-    Parameters
-    ----------
-    package : str
-        Its full name; imported already, or being so.
-    kind : type
-        What they are subclasses of. Private ones are left out, and those that still have an abstract method.
     """
     names = sorted(module.name for module in iter_modules(sys.modules[package].__path__))
     modules = [import_module(f"{package}.{name}") for name in names]
@@ -80,3 +67,13 @@ def _can_be_made(cls: type) -> bool:
     return not cls.__name__.startswith("_") and not any(
         getattr(member, "__isabstractmethod__", False) for member in members
     )
+
+
+# ---- plain files that ship: folders at the top of a checkout, where people add to them; in a wheel, below the package
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def shipped_folder(name: str) -> Path:
+    """The folder ``driver_profiles`` or ``templates``."""
+    packed = _PACKAGE / "resources" / name
+    return packed if packed.is_dir() else _PACKAGE.parent / name

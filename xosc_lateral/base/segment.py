@@ -9,39 +9,13 @@ from types import MappingProxyType
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.limits import CONTEXT_RANGES
 
 MINIMUM_SPEED = 40.0 / 3.6
 """Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
 
-# Contexts that a scenario can supply by itself: name -> (unit, what is neutral).
-# `None` as the neutral value: "there is none", written as NaN in the arrays (no vehicle ahead, say).
-CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
-    {
-        "speed": "m/s",
-        "acceleration": "m/s2",
-        "curvature": "1/m",
-        "lane_width": "m",
-        "lane_index": "-",
-        "lane_count": "-",
-        "crossfall": "%",
-        "grade": "%",
-        "lead_distance": "m",
-        "is_truck": "-",
-        "lead_is_truck": "-",
-        "left_distance": "m",
-        "right_distance": "m",
-        "left_is_truck": "-",
-        "right_is_truck": "-",
-        "oncoming_distance": "m",
-        "time_of_day": "h",
-        "rain": "mm/h",
-        "wind_speed": "m/s",
-        "wind_direction": "deg",
-        "friction": "-",
-        "illuminance": "lx",
-    }
-)
-
+CONTEXT_UNITS: Mapping[str, str] = MappingProxyType({name: known.unit for name, known in CONTEXT_RANGES.items()})
+"""Of the contexts that a scenario can supply by itself; NaN in their arrays where there is none (no vehicle ahead)."""
 
 FADES = "_fades"
 """Ends the name of a column that says how far another column's is there, 0 to 1, where it comes and goes, as a lane

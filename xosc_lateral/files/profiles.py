@@ -14,8 +14,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.base.limits import PROFILE_SIZE
-from xosc_lateral.base.plugins import plugins
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import plugins, shipped_folder
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import check_profile
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata

@@ -39,23 +39,14 @@ Cell = Callable[[str, Path], Any]
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How users say a setting.
+    """How users say a setting."""
 
-    - `read`: what they say in Python, a word of the command line or a cell of a table -> the field's value, or
-      `ValueError`
-    - `flags`: on the command line; empty: its name
-    - `kind`: type of the command line's value; None: that of a call's keyword, or several verbs share it (`SHARED`)
-    - `words`: what else the command line says of it (help, limits)
-    - `cell`: reads the column of its name; None: a table has no such column
-    - `prefix`, `entry`: of columns that hold one entry each of a mapping
-    """
-
-    read: Callable[[Any], Any]
-    flags: tuple[str, ...] = ()
-    kind: Any = None
-    words: Mapping[str, Any] = field(default_factory=dict)
-    cell: Cell | None = None
-    prefix: str = ""
+    read: Callable[[Any], Any]  # what they say in Python, a word or a cell -> the field's value; or `ValueError`
+    flags: tuple[str, ...] = ()  # on the command line; empty: its name
+    kind: Any = None  # of the command line's value; None: that of a call's keyword, or verbs share it (`SHARED`)
+    words: Mapping[str, Any] = field(default_factory=dict)  # what else the command line says of it (help, limits)
+    cell: Cell | None = None  # reads the column of its name; None: a table has no such column
+    prefix: str = ""  # prefix, entry: of columns that hold one entry each of a mapping
     entry: Cell | None = None
 
     def value(self, name: str, stated: Any) -> Any:
@@ -167,17 +158,14 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
             for item in settable(settings)
         ]
         verb.__signature__ = signature.replace(parameters=[*positional, *named])  # type: ignore[attr-defined]
-        verb.__doc__ = _with_parameters(verb.__doc__ or "", settings)
+        # The settings' own parameters in place of the one line that refers to them.
+        _, _, described = inspect.cleandoc(settings.__doc__ or "").partition("Parameters\n----------\n")
+        parameters, _, _ = described.partition("\n\nRaises")
+        text = inspect.cleandoc(verb.__doc__ or "")
+        verb.__doc__ = text.replace(f"options\n    `{settings.__name__}`.", parameters)
         return verb
 
     return with_options
-
-
-def _with_parameters(text: str, settings: type) -> str:
-    """A docstring with the settings' own parameters in place of the one line that refers to them."""
-    _, _, described = inspect.cleandoc(settings.__doc__ or "").partition("Parameters\n----------\n")
-    parameters, _, _ = described.partition("\n\nRaises")
-    return inspect.cleandoc(text).replace(f"options\n    `{settings.__name__}`.", parameters)
 
 
 def names(stated: str | Collection[str]) -> frozenset[str]:

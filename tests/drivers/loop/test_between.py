@@ -10,8 +10,7 @@ from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.loop.close import close_loop
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.model import Outcome
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Outcome, fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.between import USUAL_S, BetweenTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives

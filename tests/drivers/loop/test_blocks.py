@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.drivers.loop.cross_validation import BLOCK_S, FOLDS, folds_of, held_out_words, hold_out_blocks
+from xosc_lateral.drivers.loop.identify import BLOCK_S, FOLDS, folds_of, held_out_words, hold_out_blocks
 
 STEP = 0.2
 BLOCK = round(BLOCK_S / STEP)

@@ -11,8 +11,7 @@ from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.column_search import ColumnSearch
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.model import Outcome
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Outcome, fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, select
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.kit.coarse import coarse_of, movement, wander
-from xosc_lateral.drivers.loop.cross_validation import held_out_gain
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.identify import held_out_gain
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, Linear

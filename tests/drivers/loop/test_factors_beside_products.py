@@ -7,7 +7,7 @@ from tests.kit.planted import planted_drive
 from xosc_lateral.drivers.loop.column_search import ColumnSearch
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.model.effects import Acts, Product

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from xosc_lateral.drivers.loop.columns import Assigned, Column, Role, Values
-from xosc_lateral.drivers.loop.feedback import Feedback, find_feedback
+from xosc_lateral.drivers.loop.columns import Assigned, Column, Feedback, Role, Values, find_feedback
 from xosc_lateral.drivers.loop.timeline import Timeline
 
 STEP = 0.2

@@ -8,10 +8,9 @@ import pytest
 from tests.kit.coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.loop.columns import Column, Values
-from xosc_lateral.drivers.loop.cross_validation import Nested, gain_over
 from xosc_lateral.drivers.loop.held_out import _quantities, fit_without
-from xosc_lateral.drivers.loop.model import Term
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.identify import Nested, gain_over
+from xosc_lateral.drivers.loop.model import Term, fit_model
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.time import StepTerm

@@ -12,7 +12,7 @@ from tests.kit.core_models import POPULATION
 from tests.kit.effects import made
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop.identify import CLOCK, initial_terms, usable_columns
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.between import BetweenTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm

@@ -5,9 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.loop.model import CLIP, OWN_LEVEL_S, own_levels
-from xosc_lateral.drivers.loop.regression import MOST_LOG_SCALE, bounded, covariance_of_log_sizes, scoring_step
+from tests.kit.coarse import coarse_of
+from xosc_lateral.drivers.loop.model import (
+    CLIP,
+    MOST_LOG_SCALE,
+    OWN_LEVEL_S,
+    bounded,
+    fit_model,
+    own_levels,
+    scoring_step,
+)
 from xosc_lateral.drivers.loop.terms.spread import Squares, log_sizes
+from xosc_lateral.drivers.loop.timeline import Coarse
+
+
+def by_second(drive: np.ndarray) -> Coarse:
+    """All rows valid, of which only the drives are known."""
+    n = len(drive)
+    return Coarse(None, np.zeros(n), np.ones(n, dtype=bool), drive, np.arange(n, dtype=float), {})  # type: ignore[arg-type]
 
 
 def test_log_sizes_are_those_of_a_gamma_regression() -> None:
@@ -41,12 +56,12 @@ def test_scoring_steps_end_where_the_likelihood_does() -> None:
     rng = np.random.default_rng(3)
     scales = rng.normal(size=(6000, 1))
     rows = np.exp(0.15 * scales[:, 0]) * rng.normal(size=6000)
-    valid, drive = np.ones(6000, dtype=bool), np.zeros(6000, dtype=np.intp)
+    coarse = by_second(np.zeros(6000, dtype=np.intp))
     size = np.zeros(1)
     for _ in range(20):
-        size = size + scoring_step(scales, rows / np.exp(scales @ size), valid, drive)
+        size = size + scoring_step(scales, rows / np.exp(scales @ size), coarse)[0]
     assert size[0] == pytest.approx(0.15, abs=4.0 / np.sqrt(2.0 * 6000))
-    assert abs(scoring_step(scales, rows / np.exp(scales @ size), valid, drive)[0]) < 1e-6
+    assert abs(scoring_step(scales, rows / np.exp(scales @ size), coarse)[0][0]) < 1e-6
 
 
 def test_a_scale_that_only_differs_between_drives_is_not_told_from_the_drives() -> None:
@@ -55,28 +70,27 @@ def test_a_scale_that_only_differs_between_drives_is_not_told_from_the_drives() 
         drive[:, None].astype(float),
         np.where(drive == 1, 3.0, 1.0) * np.random.default_rng(4).normal(size=1000),
     )
-    step = scoring_step(scales, rows, np.ones(1000, dtype=bool), drive)
+    step, _ = scoring_step(scales, rows, by_second(drive))
     assert step[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_errors_are_the_spread_of_replicates_whose_squares_come_in_clusters() -> None:
     rng = np.random.default_rng(5)
-    valid, drive = np.ones(1200, dtype=bool), np.zeros(1200, dtype=np.intp)
+    coarse = by_second(np.zeros(1200, dtype=np.intp))
     sizes, errors = [], []
     for _ in range(250):
         scales = np.repeat(rng.normal(size=20), 60)[:, None]  # as steady as the clusters
         rows = np.repeat(np.exp(0.3 * rng.normal(size=20)), 60) * rng.normal(size=1200)
-        sizes.append(scoring_step(scales, rows, valid, drive)[0])
-        errors.append(np.sqrt(covariance_of_log_sizes(scales, rows, valid, drive)[0, 0]))
+        step, covariance = scoring_step(scales, rows, coarse)
+        sizes.append(step[0])
+        errors.append(np.sqrt(covariance[0, 0]))
     assert np.median(errors) == pytest.approx(np.std(sizes), rel=0.25)
     assert np.std(sizes) > 1.5 / np.sqrt(2.0 * 1200)  # independent squares would promise so much less
 
 
 def test_no_columns_have_no_covariance() -> None:
-    nothing = np.zeros((10, 0))
-    assert covariance_of_log_sizes(
-        nothing, np.ones(10), np.ones(10, dtype=bool), np.zeros(10, dtype=np.intp)
-    ).shape == (0, 0)
+    fitted = fit_model(coarse_of(np.random.default_rng(6).normal(size=3000)), ())
+    assert (fitted.covariance.shape, fitted.log_covariance.shape) == ((0, 0), (0, 0))
 
 
 def test_levels_of_drives_are_drawn_towards_the_mean_by_their_length() -> None:

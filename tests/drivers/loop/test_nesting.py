@@ -7,8 +7,8 @@ import pytest
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
-from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks, nest
 from xosc_lateral.drivers.loop.dictionary import Search
+from xosc_lateral.drivers.loop.identify import hold_out_blocks, nest
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import COARSE

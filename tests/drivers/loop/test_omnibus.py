@@ -8,8 +8,8 @@ import pytest
 from tests.kit.coarse import STEP, coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.dictionary import Search
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.omnibus import DELAYS, LEVEL, check_remainder, tents
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.timeline import Coarse
 

@@ -22,7 +22,7 @@ from xosc_lateral.drivers.loop.selection import STAGES, TERMS, in_stages, shared
 from xosc_lateral.drivers.loop.significance import BUDGET
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model import effects
-from xosc_lateral.drivers.model.effects import Effect, known_effects
+from xosc_lateral.drivers.model.effects import Acts, Effect, known_effects
 from xosc_lateral.drivers.model.profile import DriverProfile, file_type
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.files.profiles import read_profile, write_profile
@@ -52,8 +52,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import norm
 from xosc_lateral.drivers.model.effects.ramp import Ramp
-from xosc_lateral.drivers.loop.model import Description, Outcome, Stage, Term
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Description, Outcome, Stage, Term, fit_model
 
 
 class RampTerm(Term):
@@ -79,8 +78,8 @@ class RampTerm(Term):
         error = float(np.sqrt(fitted.covariance[part, part][0, 0]))
         return (Ramp(size=float(fitted.sizes[part][0]), size_error=error),)
 
-    def remove(self, fitted, effects, removal):
-        removal.location += self.fine_mean_columns(fitted.coarse)[:, 0] * effects[0].size
+    def removed(self, fitted, effects):
+        return [("location", self.fine_mean_columns(fitted.coarse)[:, 0] * effects[0].size)]
 
     def describe(self, fitted, effects, key):
         return Description("ramp", "linear", effects[0].size, effects[0].size_error, "", "")
@@ -140,7 +139,7 @@ def test_the_loop_finds_it_where_it_acts_sizes_and_removes_it(added: type[Term],
     estimates = found.final.estimates
     (effect,) = estimates["ramp 0"][1]
     assert effect.size == pytest.approx(0.25, abs=3.0 * effect.size_error)
-    removed = removal_of(found.final).location
+    removed = removal_of(found.final)[Acts.LOCATION]
     assert removed[-100] - removed[100] == pytest.approx(effect.size, rel=0.05)
     write_profile(DriverProfile("ramping", make_profile().model, (effect,)), tmp_path / "p.json")
     again = read_profile(tmp_path / "p.json")

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.kit.coarse import coarse_of, movement
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import Squares, of_squares
 from xosc_lateral.drivers.loop.timeline import Coarse

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.kit.coarse import SPREAD, coarse_of, movement, wander
-from xosc_lateral.drivers.loop import regression
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop import model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
 from xosc_lateral.drivers.loop.timeline import Coarse
@@ -112,7 +112,7 @@ def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(
     factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = fit_model(planted(5), (mean_term(),))
-    monkeypatch.setattr(regression, "MEASUREMENT_NOISE", abs(factor) * regression.MEASUREMENT_NOISE)
+    monkeypatch.setattr(model, "MEASUREMENT_NOISE", abs(factor) * model.MEASUREMENT_NOISE)
     other = fit_model(planted(5, scale=factor), (mean_term(),))
     np.testing.assert_allclose(other.sizes, factor * one.sizes, rtol=1e-6)
     np.testing.assert_allclose(other.innovations, np.sign(factor) * one.innovations, atol=1e-6)

@@ -7,8 +7,8 @@ import pytest
 
 from tests.kit.coarse import movement, timeline_of
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_metrics
-from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
 from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS, Scorecard, _starts, score_runs
+from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.timeline import Timeline
 
 SECONDS = 1800.0

@@ -9,9 +9,8 @@ from msgspec import structs
 from tests.kit.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.drivers.loop.candidates import FINE_SCALES, Family, candidates_of, shapes_of
 from xosc_lateral.drivers.loop.columns import Column, Values
-from xosc_lateral.drivers.loop.model import Fitted
+from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.refinement import Refinement
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, join_drives, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Linear, Product, Proximity, Saturating, Threshold
@@ -100,7 +99,7 @@ def test_a_finer_choice_pays_for_its_number() -> None:
     distance = np.where(rng.random(400) < 0.5, np.nan, rng.exponential(40.0, 400))
     columns = [Column("gap", Values.NUMBER, gaps=True), Column("lane", Values.LEVELS, gaps=False, levels=(0.0, 1.0))]
     context = {"gap": distance, "lane": (rng.random(400) < 0.5).astype(float)}
-    candidates = candidates_of(columns, context, most=24)
+    candidates = candidates_of(columns, context)
     for family in Family:
         members = [one for one in candidates if one.family is family]
         np.testing.assert_allclose([one.cost for one in members], 2.0 * np.log(len(members)))

@@ -8,7 +8,7 @@ import pytest
 from tests.kit.planted import planted_drive
 from xosc_lateral.drivers.fitting.bands import density_of
 from xosc_lateral.drivers.loop.held_out import fit_refined
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Linear

@@ -13,12 +13,12 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import in_digits
 from xosc_lateral.drivers.loop.autocorrelation import moving_sum, positions_in_run
 from xosc_lateral.drivers.loop.timeline import (
+    Coarse,
     coarse_all,
     coarse_mean,
     coarse_middle,
     join_drives,
     local_mean,
-    means_by_drive,
     on_fine_grid,
 )
 from xosc_lateral.drivers.model.effects import Acts, Linear
@@ -66,7 +66,7 @@ def test_local_means_count_valid_rows_alone(valid: np.ndarray, seconds: float) -
         near = slice(max(k - half, 0), k + half + 1)
         inside = values[near][valid[near]]
         expected.append(inside.mean() if len(inside) else 0.0)
-    np.testing.assert_allclose(local_mean(values, valid, seconds, STEP), expected, atol=1e-12)
+    np.testing.assert_allclose(local_mean(values, valid, seconds), expected, atol=1e-12)
 
 
 @given(flags)
@@ -76,7 +76,8 @@ def test_means_of_drives_count_valid_rows_alone(valid: np.ndarray) -> None:
     for index in range(int(drive.max()) + 1):
         inside = values[valid & (drive == index)]
         expected.append(inside.mean() if len(inside) else 0.0)
-    np.testing.assert_allclose(means_by_drive(values, valid, drive), expected, atol=1e-12)
+    coarse = Coarse(None, values, valid, drive, values, {})  # type: ignore[arg-type]
+    np.testing.assert_allclose(coarse.by_drive(values), expected, atol=1e-12)
 
 
 @given(flags)

@@ -72,3 +72,14 @@ def test_streams_that_were_saved_go_on_where_they_were(name: str) -> None:
     again = OffsetStream.from_dict(profile_of(name), json.loads(json.dumps(stream.to_dict())))
     offsets = [again.step(context) for context in columns[ahead + STEPS_BEFORE_STATE :]]
     np.testing.assert_allclose(offsets, load(name, "offsets")["stream_after"], rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("name", ["two-level-effects", "best-effects", "best-paced"])
+def test_streams_that_0_2_saved_go_on_where_they_were(name: str) -> None:
+    stream = OffsetStream.from_dict(profile_of(name), load(name, "state"))
+    columns, passed = rows(contexts(1000, 1.0 / RATE)), stream.preview_steps + STEPS_BEFORE_STATE
+    offsets = [stream.step(context) for context in columns[passed:]]
+    np.testing.assert_allclose(offsets, load(name, "offsets")["stream_after"], rtol=0, atol=TOLERANCE)
+    again = OffsetStream.from_dict(profile_of(name), json.loads(json.dumps(stream.to_dict())))
+    context = columns[-1]
+    assert [again.step(context) for _ in range(700)] == [stream.step(context) for _ in range(700)]

@@ -6,10 +6,11 @@ import json
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.model.effects import Acts, Linear
+from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, Linear
 from xosc_lateral.drivers.model.group import OffsetGroup
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
@@ -38,8 +39,6 @@ def contexts(n: int, ticks: int, rng: np.random.Generator) -> list[dict[str, NDA
 
 
 def with_rate(profile: DriverProfile) -> DriverProfile:
-    from msgspec.structs import replace
-
     effect = Linear(
         acts=Acts.RATE, column="speed", coefficients=(0.02,), errors=(0.0,), reference=(30.0,), between_drivers=(0.01,)
     )
@@ -83,3 +82,15 @@ def test_in_even_traffic_a_driver_has_the_offsets_that_are_sampled() -> None:
     group.add([seed])
     found = [group.advance({"speed": np.array([28.0])}, np.array([3.6]))[0, 0] for _ in range(len(segment))]
     np.testing.assert_allclose(found, sample_offsets(profile, segment, seed), atol=1e-12, rtol=0.0)
+
+
+def test_hidden_effects_are_those_that_are_sampled_bit_by_bit() -> None:
+    """A factor that no hidden effect has is no factor of 1: rounding would differ."""
+    profile = replace(
+        read_profile("motorway"), effects=(Drift(size=0.1), Cycle(amplitude=0.05, period_s=12.0, coherence_s=300.0))
+    )
+    seed, segment = np.random.SeedSequence(2), Segment.even(60.0, profile.model.step, 3.6, 28.0)
+    group = OffsetGroup(profile, ())
+    group.add([seed])
+    offsets = [group.advance({}, np.array([3.6]))[0, 0] for _ in range(len(segment))]
+    np.testing.assert_array_equal(offsets, sample_offsets(profile, segment, seed))

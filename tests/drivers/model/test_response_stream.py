@@ -11,8 +11,8 @@ from tests.kit.effects import STEP, made
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import ColumnEffect, Linear, Product
 from xosc_lateral.drivers.model.effects.shapes import Factor
+from xosc_lateral.drivers.model.group import ResponseStream, ResponseStreamState
 from xosc_lateral.drivers.model.records import plain, read_as
-from xosc_lateral.drivers.model.sampling import ResponseStream, ResponseStreamState
 
 N = 120
 
@@ -38,13 +38,19 @@ def row(values: dict[str, np.ndarray], at: int) -> dict[str, np.ndarray]:
     return {name: column[min(at, N - 1)][None] for name, column in values.items()}
 
 
-def by_rows(effect: ColumnEffect, values: dict[str, np.ndarray], stop: int = N) -> tuple[list[float], ResponseStream]:
+def of_one_driver(effect: ColumnEffect) -> ResponseStream:
     stream = ResponseStream(effect, STEP)
+    stream.join([effect.coefficients])
+    return stream
+
+
+def by_rows(effect: ColumnEffect, values: dict[str, np.ndarray], stop: int = N) -> tuple[list[float], ResponseStream]:
+    stream = of_one_driver(effect)
     for at in range(stream.ahead):
-        stream.take(row(values, at), before=False)
+        stream.see(row(values, at))
     found = []
     for at in range(stop):
-        stream.take(row(values, at + stream.ahead), before=False)
+        stream.see(row(values, at + stream.ahead))
         terms = stream.next()
         assert terms.location is not None and terms.location.shape == (1,)
         found.append(float(terms.location[0]))
@@ -69,14 +75,14 @@ def test_only_what_lies_ahead_has_to_be_known_before() -> None:
 def test_rows_before_the_drive_are_seen_but_get_no_response(name: str) -> None:
     """What was before the drive counts for a slow response: the drive goes on as if it had begun back there."""
     effect, values, begin = EFFECTS[name], context(), 30
-    stream = ResponseStream(effect, STEP)
+    stream = of_one_driver(effect)
     for at in range(begin):
-        stream.take(row(values, at), before=True)
+        stream.see(row(values, at), before=True)
     for at in range(begin, begin + stream.ahead):
-        stream.take(row(values, at), before=False)
+        stream.see(row(values, at))
     found = []
     for at in range(begin, N):
-        stream.take(row(values, at + stream.ahead), before=False)
+        stream.see(row(values, at + stream.ahead))
         location = stream.next().location
         assert location is not None
         found.append(float(location[0]))
@@ -89,11 +95,11 @@ def test_a_state_that_went_through_json_goes_on_as_if_nothing_had_been(name: str
     effect, values = EFFECTS[name], context(2)
     begun, stream = by_rows(effect, values, stop)
     saved = read_as(ResponseStreamState, json.loads(json.dumps(plain(stream.state))))
-    other = ResponseStream(effect, STEP)
+    other = of_one_driver(effect)
     other.restore(saved)
     rest = []
     for at in range(stop, N):
-        other.take(row(values, at + other.ahead), before=False)
+        other.see(row(values, at + other.ahead))
         location = other.next().location
         assert location is not None
         rest.append(float(location[0]))

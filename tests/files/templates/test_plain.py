@@ -9,7 +9,7 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.base.errors import XoscLateralError
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.files.templates import TEMPLATES, PlainTemplate, plain_templates
 

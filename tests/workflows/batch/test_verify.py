@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.base.version import BEHAVIOUR
 from xosc_lateral.cli import main
 from xosc_lateral.files.openscenario.provenance import content_hash

@@ -10,7 +10,7 @@ import pytest
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.workflows.batch.request import frame_requests
+from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
@@ -45,11 +45,11 @@ def test_an_argument_comes_before_the_configuration_and_both_are_said(tmp_path: 
 
 def test_rows_of_a_table_choose_and_a_wrong_word_is_named_with_its_line(tmp_path: Path) -> None:
     frame = pd.DataFrame({"scenario": ["a.xosc", "b.xosc"], "neighbours": ["none", ""]})
-    chosen = [request.settings.neighbours for request in frame_requests(frame, ConvertSettings())]
+    chosen = [request.settings.neighbours for request in read_request_table(frame, ConvertSettings())]
     assert chosen == [Neighbours.NONE, Neighbours.BORROW]
     frame.loc[1, "neighbours"] = "all"
     with pytest.raises(FormatError, match=r"3.*neighbours 'all', expected one of profile, borrow, none"):
-        list(frame_requests(frame, ConvertSettings()))
+        list(read_request_table(frame, ConvertSettings()))
 
 
 def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.kit.coarse import coarse_of, movement, wander
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Linear

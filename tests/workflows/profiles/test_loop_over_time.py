@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.kit.coarse import coarse_of, movement
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.regimes import RegimeFit, RegimesTerm
 from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.workflows.profiles.loop_curves import (

@@ -18,7 +18,7 @@ from xosc_lateral.workflows.conversion.result import EntityResult, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.playing.figures import lane_changes_over_time
 from xosc_lateral.workflows.recordings.lateral import Rough, fit_transition
-from xosc_lateral.world.motion.crossings import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH, bell_share
+from xosc_lateral.world.motion.segments import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH, bell_share
 
 WIDTH = 3.5
 

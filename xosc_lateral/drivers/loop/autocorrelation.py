@@ -14,13 +14,14 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from xosc_lateral.base.rows import true_slices
 
 MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
@@ -54,10 +55,8 @@ class MovementProcess:
     def start(self) -> FloatArray:
         """Whitening of the first p rows of a run, lower triangular, shape (p, p). [1/m]"""
         matrix = np.zeros((self.order, self.order))
-        for row in range(self.order):
-            matrix[row, row] = 1.0
-            matrix[row, :row] = -self.lags[row][::-1]
-            matrix[row] /= self.deviations[row]
+        for row, lags in enumerate(self.lags[:-1]):
+            matrix[row, : row + 1] = np.append(-lags[::-1], 1.0) / self.deviations[row]
         return matrix
 
     def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
@@ -98,7 +97,7 @@ def fit_autoregression(
     """Least squares over rows that have the whole memory in their run: `order` past values, means of doubling stretches
     up to `longest`, beside white `noise` of a standard deviation, which is a ridge."""
     position = positions_in_run(valid)
-    rows_in_all = max(1, int((position >= 0).sum()))
+    rows_in_all = max(1, int(valid.sum()))
     order = max(1, order)
     while order > 1 and (position >= order).sum() < max(ROWS_PER_COEFFICIENT * order, 0.25 * rows_in_all):
         order -= 1
@@ -113,21 +112,18 @@ def fit_autoregression(
     sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
     past = [values[rows - lag] for lag in range(1, order + 1)]
     past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
+    lengths: IntArray = np.diff(edges)
     design, now = np.stack(past, axis=1), values[rows]
     # the variance of that noise in each past value or mean
-    shares = noise**2 / np.array([1.0] * order + [high - low for low, high in pairwise(edges)])
+    shares = noise**2 / np.concatenate([np.ones(order), lengths.astype(np.float64)])
     gram = design.T @ design
     gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
-    gram[np.diag_indices(len(gram))] += len(rows) * shares
+    gram[np.diag_indices(len(gram))] += float(len(rows)) * shares
     sizes = np.linalg.lstsq(gram, design.T @ now, rcond=None)[0]
     variance = float(np.mean((now - design @ sizes) ** 2)) * len(rows) / max(1, len(rows) - len(sizes))
     variance += noise**2 + float(shares @ sizes**2)
-    lags = [sizes[:order]]
-    lags += [
-        np.full(high - low, size / (high - low))
-        for size, (low, high) in zip(sizes[order:], pairwise(edges), strict=True)
-    ]
-    return _stepped_down(np.concatenate(lags), max(variance, 1e-300))
+    lags = np.append(sizes[:order], np.repeat(sizes[order:] / lengths, lengths))
+    return _stepped_down(lags, max(variance, 1e-300))
 
 
 def _reflections(lags: FloatArray) -> FloatArray:
@@ -174,8 +170,7 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IndexArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
-    """A process freed of what each short drive's level does to it (Nickell's bias, errors an eighth too small), by
-    indirect inference [3]_."""
+    """A process freed of what each short drive's level does to it (Nickell's bias, an eighth of an error) [3]_."""
     if process.order == 0:
         return process
     rng = np.random.default_rng(BIAS_SEED)
@@ -188,13 +183,11 @@ def unbiased(
             return process
         lags += again.lags[-1] / BIAS_DRAWS
         log_variance += 2.0 * float(np.log(again.deviations[-1])) / BIAS_DRAWS
-    log_variance_fitted = 2.0 * float(np.log(process.deviations[-1]))
+    fitted = 2.0 * float(np.log(process.deviations[-1]))
     for share in (1.0, 0.5, 0.25):
         better = process.lags[-1] + share * (process.lags[-1] - lags)
         if np.abs(_reflections(better)).max() < MAX_REFLECTION:
-            return _stepped_down(
-                better, float(np.exp(log_variance_fitted + share * (log_variance_fitted - log_variance)))
-            )
+            return _stepped_down(better, float(np.exp(fitted + share * (fitted - log_variance))))
     return process
 
 
@@ -211,27 +204,22 @@ class Whitener:
     @cached_property
     def compact(self) -> Whitener:
         """The same for the valid rows alone, put side by side: half the work where drives are short."""
-        ends = np.cumsum([run.stop - run.start for run in self._runs])
-        runs = tuple(
-            slice(int(end) - (run.stop - run.start), int(end)) for run, end in zip(self._runs, ends, strict=True)
-        )
+        ends = np.cumsum([0, *(run.stop - run.start for run in self._runs)]).tolist()
+        runs = tuple(slice(*edges) for edges in pairwise(ends))
         _, drive = np.unique(self.drive[self.valid], return_inverse=True)
         valid = np.ones(int(self.valid.sum()), dtype=np.bool_)
         return Whitener(self.process, valid, drive.astype(np.intp), self.scale[self.valid], runs)
 
     @cached_property
-    def _runs(self) -> list[slice]:
-        if self.runs:
-            return list(self.runs)
-        return true_slices(self.valid)
+    def _runs(self) -> Sequence[slice]:
+        return self.runs or true_slices(self.valid)
 
     @cached_property
     def _edges(self) -> IndexArray:
         return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
 
     def by_position(self, values: FloatArray) -> FloatArray:
-        """What belongs to a row by its place in its run, shape (n,), from `values`, shape (order + 1,), the last for
-        all later."""
+        """What belongs to a row by its place in its run, shape (n,), from `values`, shape (order + 1,)."""
         return values[np.clip(positions_in_run(self.valid), 0, self.process.order)]
 
     @property

@@ -49,6 +49,9 @@ FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 NEAR_SHARE = 2.0 / 3.0  # A distance comes near: its 5 % quantile is below this share of its median. [-]
 # Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]
 PHASES = np.pi * np.arange(4) / 4.0
+# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
+# twenty times as much.
+MAX_PRODUCT_COLUMNS = 24
 
 
 class Family(StrEnum):
@@ -84,10 +87,9 @@ class Candidate:
         return np.asarray(self.effect.seen(context) @ np.asarray(self.contrast))
 
 
-def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:
-    """All candidates, from the road-following rows of `context`; beyond `most` columns products are of those of known
-    role."""
-    known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:most]
+def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray]) -> list[Candidate]:
+    """All candidates, from the road-following rows of `context`."""
+    known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:MAX_PRODUCT_COLUMNS]
     paired = [column for column in columns if column in known_first]
     factors = {column.name: _factors(column, context[column.name]) for column in columns}
     families: dict[Family, list[ColumnEffect]] = {
@@ -99,25 +101,24 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
             for pair in _pairs(first, second, factors)
         ],
     }
+
+    def contrasts(effect: ColumnEffect) -> list[tuple[float, ...]]:
+        """Weights of its components with which an effect is tried."""
+        if isinstance(effect, Angular):
+            return [(float(np.sin(phase)), float(np.cos(phase))) for phase in PHASES]
+        return [(1.0,) * effect.quantity({name: context[name][:1] for name in effect.columns}).shape[1]]
+
     candidates = []
     for family, effects in families.items():
-        members = [(effect, contrast) for effect in effects for contrast in _contrasts(effect, context)]
+        members = [(effect, contrast) for effect in effects for contrast in contrasts(effect)]
         candidates += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
     return candidates
-
-
-def _contrasts(effect: ColumnEffect, context: Mapping[str, FloatArray]) -> list[tuple[float, ...]]:
-    """Weights of its components with which an effect is tried."""
-    if isinstance(effect, Angular):
-        return [(float(np.sin(phase)), float(np.cos(phase))) for phase in PHASES]
-    return [(1.0,) * effect.quantity({name: context[name][:1] for name in effect.columns}).shape[1]]
 
 
 def shapes_of(
     column: Column, values: FloatArray, *, curves: bool
 ) -> tuple[list[ColumnEffect], list[ColumnEffect], float]:
-    """Plain shapes of one column, bent ones with fine limits and scales, and how many times as many as the dictionary
-    has."""
+    """Plain shapes of a column, bent ones in fine steps, and how many times as many as the dictionary has."""
     bent = _unique((*_bent(column, values, FINE_LIMITS), *_fading(column, values)))
     bent += _curves(column, values) if curves else []
     return _unique(_plain(column, values)), bent, len(bent) / max(1, len(_unique(_bent(column, values))))
@@ -205,8 +206,7 @@ def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -
 
 
 def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Quantiles of a column while it is not one of the few values that it mostly has, a crossfall of 2.5 % either way,
-    say."""
+    """Quantiles of a column beside the few values that it mostly has, a crossfall of 2.5 % either way, say."""
     while True:
         values = np.quantile(seen, shares)
         known, times = np.unique(values, return_counts=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
-from xosc_lateral.drivers.loop.cross_validation import Progress, folds_of, held_out_words
 from xosc_lateral.drivers.loop.held_out import (
     HeldOut,
     Scorecard,
@@ -21,11 +20,10 @@ from xosc_lateral.drivers.loop.held_out import (
     score_held_out,
     score_runs,
 )
-from xosc_lateral.drivers.loop.identify import Identified, identify, initial_terms
-from xosc_lateral.drivers.loop.model import Description, Fitted, Term
+from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
 from xosc_lateral.drivers.loop.significance import LoopSeed
@@ -59,9 +57,7 @@ class Finding(Description):
 def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
     """Put errors on held-out blocks to what was described."""
     before, after = scored.error_of(size.statistic)
-    described = {one.name: getattr(size, one.name) for one in fields(size)} | {
-        "measure": size.measure or size.statistic
-    }
+    described = vars(size) | {"measure": size.measure or size.statistic}
     return Finding(error_before=before, error_after=after, **described, **about)
 
 
@@ -69,15 +65,9 @@ def describe_finding(
     accepted: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut
 ) -> Finding:
     """Put sizes and errors to what was accepted."""
-    term = accepted.term
-    about = {
-        "kind": term.kind,
-        "columns": term.columns,
-        "alike": term.alike,
-        "p_value": accepted.p_value,
-        "gain": accepted.gain,
-    }
-    return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
+    term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
+    about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
+    return _finding(term.describe(fitted, effects, key), scored, **about, **evidence)
 
 
 # The held-out error of a profile with more effects may be so many times the base's, 24 runs leave 2 % of noise; or more
@@ -106,11 +96,6 @@ class LoopResult:
     seed: int
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Drives."""
-        return self.coarse.timeline.names
-
-    @property
     def final(self) -> Fitted:
         """All terms that are kept, fitted to everything."""
         return self.identified.selection.final
@@ -130,11 +115,6 @@ class LoopResult:
         """Sampling error of the measured drives: how far random halves of their blocks are from all of them. [m]"""
         return self.lack_of_fit.floor
 
-    @property
-    def held_out(self) -> str:
-        """What was held out, in words."""
-        return held_out_words(self.coarse.timeline)
-
 
 def close_loop(
     drives: Sequence[Drive],
@@ -150,32 +130,8 @@ def close_loop(
 ) -> LoopResult:
     """Find what a profile fails to reproduce, trace it, add it, and score it on held-out blocks.
 
-    Parameters
-    ----------
-    drives : sequence of Drive
-    base : DriverProfile, optional
-        Start from it and from its effects; without, one is fitted first.
-    seed : int
-        Same drives, base and seed: same result.
-    in_sample : bool
-        Whether the base was fitted on these very drives: it is then fitted again without each held-out fold.
-    name : str
-        Of the refined profile.
-    provenance : Provenance, optional
-        What is known about the drives.
-    excluded : sequence of str
-        Columns that are not to be tested.
-    roles : mapping of str to str
-        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
-        proposed from name and values.
-    progress : callable
-
-    Raises
-    ------
-    NotEnoughDataError
-        When less than two minutes of road-following are left after cutting.
-    FormatError
-        A role that there is not, or of a column that the drives lack.
+    See `xosc_lateral.close_loop`; `excluded` columns are not tested, and a base that was fitted on these very drives,
+    `in_sample`, is fitted again without each held-out fold.
     """
     root = np.random.SeedSequence(seed)
     progress(0.0, "reading the drives")
@@ -244,8 +200,7 @@ def _that_helps(setting: Setting, identified: Identified, progress: Progress) ->
 
 
 def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
-    """The accepted term, not sure to gain, whose own held-out mean or spread is worst predicted, beyond what halves
-    differ."""
+    """The accepted term, not sure to gain, whose held-out mean or spread is predicted worst, beyond chance."""
     worst: tuple[float, Term | None] = (1.0, None)
     for accepted, key, effects in _accepted(selection):
         if accepted.gain is not None and accepted.gain.interval[0] > 0.0:

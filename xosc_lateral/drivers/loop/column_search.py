@@ -20,10 +20,9 @@ from xosc_lateral.drivers.loop.dictionary import (
     orthonormal,
     score_entries,
 )
-from xosc_lateral.drivers.loop.model import Fitted, Outcome
+from xosc_lateral.drivers.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
@@ -91,8 +90,7 @@ class _Scored:
         return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
-        """Best entry of the best sets of columns, and of each column of the best: of a product with what hardly varies,
-        one factor."""
+        """Best entry of the best sets of columns, and of each single column of the very best."""
         scores, columns = self.scores, [candidate.columns for candidate in self.dictionary.candidates]
         order = np.argsort(-scores, kind="stable")
         best: dict[tuple[str, ...], int] = {}
@@ -169,8 +167,7 @@ class ColumnSearch:
         draws: int = NULL_DRAWS,
         spared: tuple[str, ...] = (),
     ) -> _Scored | None:
-        """Score what is neither barred nor refused beside the model and the cross-basis of its columns, but for those
-        `spared`."""
+        """Score what is neither barred nor refused beside all that is known of its columns but those `spared`."""
         kind, search = self.kind, self.search
         if dictionary is None:
             dictionary = build_dictionary(search.quantities, problem.whitener)

@@ -17,15 +17,16 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.model import Description, Fitted
 from xosc_lateral.drivers.loop.residual import simulated_runs
 from xosc_lateral.drivers.loop.significance import MINIMUM_P, LoopSeed
-from xosc_lateral.drivers.loop.timeline import Timeline, smoothed
+from xosc_lateral.drivers.loop.timeline import Timeline, local_mean
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.seeds import child
 
 TIMES_S = (0.4, 1.0, 2.0, 4.0, 8.0)  # Averaging times between which the bands lie. [s]
+WHOLE_S = 30.0  # Movement about the mean over so long is the whole that the bands are parts of. [s]
 BLOCK = 300  # Samples that one value per band is taken from: 60 s. [-]
 SHAPE_LEVEL = 0.003  # Probability of a false finding.
 N_RUNS = 3  # Runs of the profile.
-STILL = 1e-9  # Blocks that move by less stand still: their bands are nothing but rounding. [m]
+STANDSTILL_DEVIATION = 1e-9  # Blocks that move by less stand still: their bands are nothing but rounding. [m]
 # A difference below this share of a band's size is no reason for another core model, however sure it is. [-]
 WORTH_ADDING = 0.05
 MIN_DRIVES = 8  # Fewer drives say nothing about a population.
@@ -35,8 +36,7 @@ DRIVERS_LEVEL = 0.002  # Probability of a false finding.
 
 @dataclass(frozen=True, eq=False)
 class SpectrumShape:
-    """Profile over drives, by bands up to `bands_s` [s], of the movement's size over its overall size, with Hotelling's
-    test [1]_."""
+    """Movement by bands up to `bands_s` [s] over the whole, profile over drives, with Hotelling's test [1]_."""
 
     KIND: ClassVar[str] = "memory"
     bands_s: tuple[float, ...]
@@ -76,21 +76,21 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
 
 def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
     """Logarithm of each band's size over the whole movement's, per block, shape (blocks, bands)."""
-    *levels, usual = smoothed(offset, timeline, (*TIMES_S, 30.0))
+    *levels, usual = (local_mean(offset, timeline.valid, seconds) for seconds in (*TIMES_S, WHOLE_S))
     bands = [finer - coarser for finer, coarser in pairwise([offset, *levels])]
     slow, rows, inside = offset - usual, [], np.flatnonzero(timeline.valid)
     for first in range(0, len(inside) - BLOCK + 1, BLOCK):
         at = inside[first : first + BLOCK]
         whole = float(np.std(slow[at]))
-        if whole > STILL:
-            rows.append([np.log(max(float(np.std(band[at])), STILL) / whole) for band in bands])
+        if whole > STANDSTILL_DEVIATION:
+            deviations = (max(float(np.std(band[at])), STANDSTILL_DEVIATION) for band in bands)
+            rows.append([np.log(deviation / whole) for deviation in deviations])
     return np.asarray(rows).reshape(-1, len(bands))
 
 
 @dataclass(frozen=True, slots=True)
 class DriverVariance:
-    """Standard deviation between drives of means [m] and log spreads, noise taken out, and the p-value that all are
-    alike."""
+    """Deviation between drives of means [m] and log spreads without noise, and the p-value that all are alike."""
 
     KIND: ClassVar[str] = "population"
     drives: int
@@ -111,8 +111,7 @@ class DriverVariance:
 
 
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
-    """Analysis of variance with drives' halves as the noise, so that slow drift counts as noise; None with too few
-    drives."""
+    """Analysis of variance with drives' halves as noise, so that drift counts as noise; None: too few drives."""
     whitener = fitted.whitener
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
     halves = []

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
-from xosc_lateral.drivers.loop.candidates import Candidate, candidates_of
+from xosc_lateral.drivers.loop.candidates import Candidate, Family, candidates_of
 from xosc_lateral.drivers.loop.columns import Column
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, draw_null
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
@@ -59,7 +59,10 @@ class Quantities:
         """Evaluate all; those that never vary on valid seconds are left out."""
         kept, rows = [], []
         for candidate in candidates:
-            second = coarse_mean(_without_gaps(candidate.values(context), timeline.valid))
+            quantity = candidate.values(context)
+            there = quantity[timeline.valid & np.isfinite(quantity)]
+            # what is unknown takes the mean of what is known and valid
+            second = coarse_mean(np.where(np.isnan(quantity), there.mean() if len(there) else 0.0, quantity))
             deviation = float(second[valid].std())
             # beside all that it ever is: a product may be zero but for rounding wherever the car follows the road
             if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
@@ -94,12 +97,6 @@ class Dictionary:
         """An entry's effect with its lag and response."""
         effect = self.candidates[index].effect
         return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
-
-
-def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
-    """What is unknown takes the mean of what is known and valid, shape (n,). [own unit]"""
-    there = values[valid & np.isfinite(values)]
-    return np.where(np.isnan(values), there.mean() if len(there) else 0.0, values)
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
@@ -181,8 +178,7 @@ def score_entries(
 def _beside_loud_stretches(
     scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
 ) -> FloatArray:
-    """Scores of the best entries beside the squares of the very rows that they rest on [2]_: the null loses where they
-    are large."""
+    """Scores of the best entries by the squares of their own rows [2]_: the null loses where they are large."""
     order = np.argsort(-scores)[:ROBUST]
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
@@ -214,8 +210,7 @@ def beside_parts(
     spans: Callable[[str], FloatArray],
     within: float,
 ) -> FloatArray:
-    """Scores of products, where that is less, beside all that either column does alone (`spans`); not of a vector's
-    components."""
+    """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components."""
     left = beside(known, residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     members: dict[tuple[str, ...], list[int]] = {}
@@ -253,9 +248,6 @@ def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
     return np.asarray(rows - basis @ (basis.T @ rows))
 
 
-# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
-# twenty times as much.
-MAX_PRODUCT_COLUMNS = 24
 # Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
 KEPT_DICTIONARIES = 2
 
@@ -287,9 +279,14 @@ class Search:
         """Evaluate all candidates once."""
         inside = coarse.timeline.valid
         seen = {column.name: coarse.context[column.name][inside] for column in columns}
-        candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
+        candidates = candidates_of(columns, seen)
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
+
+    def plain_candidates(self) -> list[Candidate]:
+        """Columns as they are, of one component each."""
+        candidates = self.quantities.candidates
+        return [one for one in candidates if one.family is Family.PLAIN and len(one.contrast) == 1]
 
     def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
         """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""

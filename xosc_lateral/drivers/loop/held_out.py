@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,9 +27,8 @@ from xosc_lateral.drivers.fitting.bands import in_bands, measured
 from xosc_lateral.drivers.fitting.context_effects import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
 from xosc_lateral.drivers.loop.columns import Column
-from xosc_lateral.drivers.loop.cross_validation import Nested, Progress, folds_of, hold_out_blocks
-from xosc_lateral.drivers.loop.model import Fitted, Removal
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.identify import Nested, Progress, folds_of, hold_out_blocks
+from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.residual import (
     LEVEL,
     SummaryStatistics,
@@ -45,22 +44,23 @@ from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.cycle import CycleTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.drivers.model.core.base import ModelKind
-from xosc_lateral.drivers.model.effects import Effect
+from xosc_lateral.drivers.model.effects import Acts, Effect
 from xosc_lateral.drivers.model.profile import COLUMNS, DriverProfile, Provenance
 from xosc_lateral.drivers.model.seeds import child, generator
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
 
 
-def removal_of(fitted: Fitted) -> Removal:
-    """What all terms did to the measured offsets."""
-    removal = Removal(np.zeros(len(fitted.coarse.timeline)))
+def removal_of(fitted: Fitted) -> dict[Acts, FloatArray]:
+    """What all terms did to the measured offsets, shape (n,) each: to the mean [m], to the logarithm of a spread."""
+    removal = {acts: np.zeros(len(fitted.coarse.timeline)) for acts in Acts}
     for term, effects in fitted.estimates.values():
-        term.remove(fitted, effects, removal)
+        for acts, part in term.removed(fitted, effects):
+            removal[acts] += part
     return removal
 
 
-def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
+def runs_without(timeline: Timeline, removal: Mapping[Acts, FloatArray], used: BoolArray) -> list[Run]:
     """Runs of the movement without effects, from the valid rows in `used`, with what a population is fitted by."""
     runs: list[Run] = []
     known = {name: timeline.context[name] for name in KNOWN_TO_THE_BASE if name in timeline.context}
@@ -75,13 +75,12 @@ def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[
     return runs
 
 
-def movement_without(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
-    """Offsets of one uninterrupted stretch without the effects, about their own mean or a given one. [m] Shape (k,)."""
-    left = timeline.offset[rows] - removal.location[rows]
-    mean = float(left.mean()) if mean is None else mean
-    width = 2 * round(0.5 * FINE_S / STEP) + 1
+def movement_without(timeline: Timeline, removal: Mapping[Acts, FloatArray], rows: slice) -> FloatArray:
+    """Offsets of one uninterrupted stretch without the effects, about their own mean. [m] Shape (k,)."""
+    left = timeline.offset[rows] - removal[Acts.LOCATION][rows]
+    mean, width = float(left.mean()), 2 * round(0.5 * FINE_S / STEP) + 1
     slow = filtered(left, np.ones(width) / width)
-    spread, fine = np.exp(-removal.spread[rows]), np.exp(-removal.fine[rows])
+    spread, fine = (np.exp(-removal[acts][rows]) for acts in (Acts.SPREAD, Acts.FINE))
     return np.asarray(mean + (slow - mean) * spread + (left - slow) * fine)
 
 
@@ -120,8 +119,7 @@ class HeldOut:
 
     @property
     def surely_worse(self) -> bool:
-        """Whether the error after is the larger one for other drives, too: half samples less the whole, added to what
-        was measured."""
+        """Whether the error after is the larger one for other drives, too: half samples added to the measured."""
         rises = []
         for half in self.halves:
             other = {name: values + np.nan_to_num(half[name]) for name, values in self.real.items()}
@@ -147,7 +145,7 @@ def score_held_out(
     real = statistics.describe(timeline.offset, timeline.valid)
     before = expected(statistics, runs_before, timeline.valid)
     after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
-    unmoved = timeline.offset - removal_of(fitted).location
+    unmoved = timeline.offset - removal_of(fitted)[Acts.LOCATION]
     halves = half_samples(statistics, unmoved, setting.blocks, generator(setting.root, LoopSeed.BLOCKS))
     return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 

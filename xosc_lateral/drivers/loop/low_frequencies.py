@@ -139,3 +139,17 @@ def without_known(
     both = np.column_stack([squares, columns])
     both[valid] = beside(orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]])), both[valid])
     return both[:, :1], both[:, 1:]
+
+
+def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes, shape (k,), and covariance, given a prior covariance but for its scale, which is likeliest (REML)."""
+    largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
+    best, scaled_prior = -np.inf, np.zeros_like(prior)
+    for scale in largest * np.geomspace(1e-6, 10.0, 60):
+        total = covariance + scale * prior
+        sign, volume = np.linalg.slogdet(total)
+        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
+        if likelihood > best:
+            best, scaled_prior = likelihood, scale * prior
+    gain = np.linalg.solve(covariance + scaled_prior, scaled_prior).T
+    return gain @ sizes, gain @ covariance

@@ -1,14 +1,19 @@
-"""The model of a drive: its terms, and what a fit of them gives.
+"""The model of a drive: its terms, and the fit of all of them together.
 
 offset = level of the drive + mean terms + scale * movement, the movement an autoregression at 1 Hz, log scale = level
-of the drive + scale terms.
+of the drive + scale terms. Mean terms are fitted jointly by generalised least squares, scale terms by iterated
+regression of squared innovations [1]_: adding a term corrects the ones found before.
+
+References
+----------
+.. [1] M. Aitkin, "Modelling variance heterogeneity in normal regression using GLIM", Applied Statistics 36, 1987.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import ClassVar, Self
@@ -16,12 +21,29 @@ from typing import ClassVar, Self
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors
+from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
+from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.refinement import Alternatives
-from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
-from xosc_lateral.drivers.model.effects import Effect
+from xosc_lateral.drivers.loop.timeline import CLUSTER_S, Coarse, on_fine_grid
+from xosc_lateral.drivers.model.effects import Acts, Effect
+
+ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
+MAXIMUM_ORDER = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
+# Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
+# 9 % at 0.5 Hz. [s]
+SMOOTHING_S = (-2, -1, 1, 2)
+CLIP = 9.0  # Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]
+OWN_LEVEL_S = 30.0  # A drive's level of the scale is its own as far as it lasts longer than this. [s]
+# White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
+# recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
+# responses and all; without this noise an effect is sized where the smoothing left nothing of it. [m]
+MEASUREMENT_NOISE = 0.03
+# Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+# that the movement contradicts grow without end. [-]
+MOST_LOG_SCALE = 3.0
+ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
 
 
 class Stage(IntEnum):
@@ -53,19 +75,6 @@ class Description:
     lag_s: float | None = None
     response_s: float | None = None
     passage: Passage | None = None  # The path through a typical bend, say.
-
-
-@dataclass(eq=False)
-class Removal:
-    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each."""
-
-    location: FloatArray  # [m]
-    spread: FloatArray = field(init=False)  # Natural logarithm of a factor.
-    fine: FloatArray = field(init=False)  # Natural logarithm of a factor.
-
-    def __post_init__(self) -> None:
-        """Nothing but the location so far."""
-        self.spread, self.fine = np.zeros(len(self.location)), np.zeros(len(self.location))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +168,11 @@ class Term(ABC):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """What the profile gets: the effect proper first, then what goes with it."""
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
-        """Add what the term did to the measured offsets; hidden ones as they most likely were."""
-        coarse, path = fitted.coarse, latent_path(self, fitted)
-        removal.location += on_fine_grid(path - path[coarse.valid].mean(), coarse.timeline)
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
+        """What the term did to the measured offsets, on the 0.2 s grid, shape (fine n,) [m] or log factor; hidden terms
+        as they most likely did."""
+        path = fitted.path(self)
+        return [(Acts.LOCATION, on_fine_grid(path - path[fitted.coarse.valid].mean(), fitted.coarse.timeline))]
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray | None:
         """What the residual is compared by, on the 0.2 s grid, shape (fine n,); None: nothing of its own."""
@@ -175,11 +185,6 @@ class Term(ABC):
     def matches(self, other: Self) -> bool:
         """Whether another fit's term is the same finding."""
         return type(self) is type(other) and self.columns == other.columns
-
-
-def latent_path(term: Term, fitted: Fitted) -> FloatArray:
-    """A term's part of the mean as fitted, shape (n,). [m]"""
-    return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,8 +222,8 @@ class Fitted:
     def explained(self) -> FloatArray:
         """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
         timeline = self.coarse.timeline
-        columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
-        return columns @ self.sizes + self.levels[timeline.drive]
+        columns = [np.zeros((len(timeline), 0)), *(term.fine_mean_columns(self.coarse) for term in self.terms)]
+        return np.concatenate(columns, axis=1) @ self.sizes + self.levels[timeline.drive]
 
     @cached_property
     def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
@@ -238,23 +243,62 @@ class Fitted:
         return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
 
     def _part(self, term: Term, widths: Sequence[int]) -> slice:
-        index = next(i for i, other in enumerate(self.terms) if other is term)
-        first = sum(widths[:index])
+        first = sum(widths[: (index := next(i for i, other in enumerate(self.terms) if other is term))])
         return slice(first, first + widths[index])
 
+    def path(self, term: Term) -> FloatArray:
+        """A term's part of the mean, shape (n,). [m]"""
+        return np.asarray(term.mean_columns(self.coarse) @ self.sizes[self.mean_part(term)])
 
-def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
-    """Columns side by side, shape (n, k); none of none."""
-    return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
+
+def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Columns of the mean and of the log scale, shape (n, k) and (n, j), and the log scale known as a whole."""
+    none = np.zeros((len(coarse), 0))
+    columns = np.concatenate([none, *(term.mean_columns(coarse) for term in terms)], axis=1)
+    scales = np.concatenate([none, *(term.scale_columns(coarse) for term in terms)], axis=1)
+    known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
+    return columns, scales, np.sum(known, axis=0) if known else np.zeros(len(coarse))
 
 
-ORDER = 12  # Past seconds that have a coefficient each in the movement's autoregression. [s]
-MAXIMUM_ORDER = 96  # Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]
-# Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
-# 9 % at 0.5 Hz. [s]
-SMOOTHING_S = (-2, -1, 1, 2)
-CLIP = 9.0  # Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]
-OWN_LEVEL_S = 30.0  # A drive's level of the scale is its own as far as it lasts longer than this. [s]
+def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
+    """Fit all terms jointly: generalised least squares and the autoregression by turns."""
+    columns, scales, known = design_of(coarse, terms)
+    valid, drive = coarse.valid, coarse.drive
+    sizes, log_sizes, log_covariance = np.zeros(columns.shape[1]), np.zeros(scales.shape[1]), np.zeros((0, 0))
+    levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
+    for _ in range(ROUNDS):
+        scale = np.exp(scales @ log_sizes + known) * spread[drive]
+        movement = np.where(valid, (coarse.offset - columns @ sizes - levels[drive]) / scale, 0.0)
+        process = fit_autoregression(movement, valid, ORDER, longest=MAXIMUM_ORDER, noise=MEASUREMENT_NOISE)
+        if not coarse.lasts:
+            process = unbiased(process, valid, drive, ORDER, longest=MAXIMUM_ORDER)
+        whitener = Whitener(process, valid, drive, scale)
+        observed, design = whitener.rows(coarse.offset), whitener.rows(columns)
+        sizes, covariance = clustered_least_squares(design, observed, coarse.cluster)
+        rows = observed - design @ sizes
+        levels = whitener.levels(coarse.offset - columns @ sizes)
+        if scales.shape[1]:
+            step, log_covariance = scoring_step(scales, rows, coarse)
+            log_sizes = bounded(log_sizes + step, scales[valid])
+        spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
+    clusters = len(np.unique(coarse.cluster[design.any(axis=1)]))
+    starts = start_factors(rows, valid, process.order)
+    factor = whitener.by_position(starts)
+    densities = -0.5 * np.square(rows / factor) - np.log(factor * whitener.deviations)
+    return Fitted(
+        coarse=coarse,
+        terms=tuple(terms),
+        whitener=whitener,
+        columns=columns,
+        sizes=sizes,
+        covariance=covariance * small_sample_factor(clusters, *design.shape),
+        levels=levels,
+        log_sizes=log_sizes,
+        log_covariance=log_covariance,
+        movement=np.where(valid, coarse.offset - columns @ sizes - levels[drive], 0.0) / scale,
+        starts=starts,
+        log_likelihood=float(np.sum(densities[valid])),
+    )
 
 
 def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
@@ -268,20 +312,46 @@ def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatA
     return np.asarray((sums + OWN_LEVEL_S) / (seconds + OWN_LEVEL_S))
 
 
-def _whitener(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
-    """What turns movement over scale, 0 where invalid, into independent rows, without measurement noise."""
-    return Whitener(fit_autoregression(movement, valid, ORDER, longest=MAXIMUM_ORDER), valid, drive, scale)
+def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Squares over their mean where valid, at most `CLIP`, shape (n,). [-]"""
+    return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
+
+
+def scoring_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
+    """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2), and the
+    sizes' covariance, shape (j, j).
+
+    The covariance is a sandwich, clustered like that of the mean: squares have heavy tails and come in clusters.
+    """
+    valid = coarse.valid
+    means = np.stack([coarse.by_drive(column) for column in scales.T], axis=1)
+    design, squares = (scales - means[coarse.drive])[valid], clipped_squares(rows, valid)[valid]
+    bread, excess = np.linalg.pinv(2.0 * design.T @ design), squares / squares.mean() - 1.0
+    edges = np.flatnonzero(np.diff(np.flatnonzero(valid) // CLUSTER_S, prepend=-1))
+    sums = np.add.reduceat(design * excess[:, None], edges, axis=0)
+    covariance = bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1)
+    return np.asarray(bread @ (design.T @ excess)), np.asarray(covariance)
+
+
+def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
+    """Log sizes [-], shape (j,), scaled down as a whole so that no row's log scale is beyond `MOST_LOG_SCALE`."""
+    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
+    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
+
+
+def _whitener(left: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
+    """What turns a movement, 0 where invalid, into independent rows, without measurement noise."""
+    return Whitener(fit_autoregression(left / scale, valid, ORDER, longest=MAXIMUM_ORDER), valid, drive, scale)
 
 
 def innovations(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """White rows of variance about 1, shape (n,), young runs by their own size, of offsets less levels and responses
-    [m]."""
+    """White rows of variance about 1, shape (n,), young runs by their own size, of offsets less responses [m]."""
     if np.any(responses):
         responses = smoothed_as_seen(moved, responses, valid, drive, scale)
     left = np.where(valid, moved - responses, 0.0)
-    whitener = _whitener(left / scale, valid, drive, scale)
+    whitener = _whitener(left, valid, drive, scale)
     rows = whitener.rows(left)
     return np.asarray(rows / whitener.by_position(start_factors(rows, valid, whitener.process.order)))
 
@@ -289,9 +359,8 @@ def innovations(
 def smoothed_as_seen(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """Responses through the five-second filter of gain one that leaves least of them: providers smooth them, edges and
-    all. [m]"""
-    whitener = _whitener(np.where(valid, moved / scale, 0.0), valid, drive, scale)
+    """Responses through the filter of 5 s and gain 1 that leaves least of them: providers smooth them. [m]"""
+    whitener = _whitener(np.where(valid, moved, 0.0), valid, drive, scale)
     seconds = np.arange(len(responses))
     shifted = [responses[np.clip(seconds - shift, 0, len(seconds) - 1)] for shift in SMOOTHING_S]
     changes = np.stack(shifted, axis=1) - responses[:, None]

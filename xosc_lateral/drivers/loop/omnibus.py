@@ -24,7 +24,7 @@ from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.dictionary import CROSS_BASIS, MIN_SUPPORT_S, Quantities, beside, orthonormal
-from xosc_lateral.drivers.loop.model import Fitted, latent_path
+from xosc_lateral.drivers.loop.model import Fitted
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.seeds import generator
@@ -49,8 +49,7 @@ class Omnibus:
 
 
 def weights_of(delays: tuple[float, ...]) -> FloatArray:
-    """Of whole seconds in kernels of gain 1 that rise to each delay from the one before and fall to the next, shape
-    (delays, n)."""
+    """Of whole seconds in tents of gain 1 that reach from each delay to its neighbours, shape (delays, n)."""
     seconds = np.arange(delays[0], delays[-1] + 1.0)
     weights = np.stack([np.interp(seconds, delays, unit) for unit in np.eye(len(delays))])
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
@@ -71,8 +70,7 @@ def smooth_covariance(number: int) -> FloatArray:
 
 
 def amid_runs(valid: BoolArray) -> BoolArray:
-    """Rows whose delays stay within their run, shape (n,): what a car does where a run ends in a lane change is no
-    response."""
+    """Rows whose delays stay within their run, shape (n,): where a run ends in a lane change is no response."""
     before = positions_in_run(valid)
     after = positions_in_run(valid[::-1])[::-1]
     return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
@@ -101,8 +99,7 @@ def check_remainder(
     *,
     only: tuple[str, ...] = (),
 ) -> Omnibus:
-    """Whether any column not `taken`, or `only` one, predicts what a fit leaves better than the innovations in another
-    order."""
+    """Whether any column not `taken`, or `only` one, predicts what a fit leaves better than by chance."""
     whitener, coarse = fitted.whitener, fitted.coarse
     amid = amid_runs(whitener.valid)
     if amid.sum() < MIN_SUPPORT_S:
@@ -162,18 +159,24 @@ class Explained:
 def explained_share(
     starts: Sequence[Fitted], finals: Sequence[Fitted], quantities: Quantities, coarse: Coarse, blocks: IntArray
 ) -> Explained | None:
-    """What each fold's effects, and its free response, predict of rows that it was not fitted on; None if nothing can
-    be held out."""
-    courses = _courses(quantities)
-    if len(finals) < 2 or not courses.shape[1]:
+    """What each fold's effects and free response predict of rows not fitted on; None: nothing is held out."""
+    # all columns' plain shapes at all delays, such that smooth weights are white
+    root = np.linalg.cholesky(smooth_covariance(len(DELAYS)))
+    plain = [
+        tents(values.astype(np.float64), DELAYS, quantities.drive) @ root
+        for candidate, values in zip(quantities.candidates, quantities.values, strict=True)
+        if candidate.family is Family.PLAIN
+    ]
+    if len(finals) < 2 or not plain:
         return None
-    gains = np.zeros((2, len(blocks)))
+    courses, gains = np.concatenate(plain, axis=1), np.zeros((2, len(blocks)))
     for fold, (start, final) in enumerate(zip(starts, finals, strict=True)):
         held = (blocks % len(finals) == fold) & coarse.valid
-        whitener = final.whitener
-        free = courses @ _free_weights(courses, start, whitener)
-        paths = (_path(start), _path(final), _path(start) + free)
-        before, *better = (_squares(whitener, final.coarse.offset - path, held) for path in paths)
+        there = Whitener(final.whitener.process, held, final.whitener.drive, final.whitener.scale)
+        free = courses @ _free_weights(courses, start, final.whitener)
+        left = (final.coarse.offset - path for path in (_path(start), _path(final), _path(start) + free))
+        # levels are the held rows' own
+        before, *better = (np.square(there.rows(np.where(held, values, 0.0))) * held for values in left)
         gains += 0.5 * (before - np.asarray(better)) / max(float(before[held].mean()) if held.any() else 1.0, 1e-300)
     numbers = np.unique(blocks[coarse.valid])
     by_effects, by_columns = (np.bincount(blocks, rows)[numbers] for rows in gains)
@@ -181,27 +184,14 @@ def explained_share(
     share = float(by_effects.sum()) / total if total else 0.0
     scatter = float(np.sqrt(number / max(number - 1, 1) * np.sum(np.square(by_effects - share * by_columns))))
     error = float(np.std(by_columns, ddof=1) / np.sqrt(number)) if number > 1 else np.inf
-    return Explained(
-        float(by_effects.mean()), float(by_columns.mean()), error, share, scatter / max(abs(total), 1e-300)
-    )
+    share_error = scatter / max(abs(total), 1e-300)
+    return Explained(float(by_effects.mean()), float(by_columns.mean()), error, share, share_error)
 
 
 def _path(fitted: Fitted) -> FloatArray:
     """Mean by the terms that say where a car is on rows that they were not fitted on, shape (n,). [m]"""
-    paths = [latent_path(term, fitted) for term in fitted.terms if term.seen_held_out]
+    paths = [fitted.path(term) for term in fitted.terms if term.seen_held_out]
     return np.asarray(np.sum([np.zeros(len(fitted.coarse)), *paths], axis=0))
-
-
-def _courses(quantities: Quantities) -> FloatArray:
-    """All columns' plain shapes at all delays, shape (n, columns * delays), such that smooth weights are white."""
-    root = np.linalg.cholesky(smooth_covariance(len(DELAYS)))
-    plain = [
-        values.astype(np.float64)
-        for candidate, values in zip(quantities.candidates, quantities.values, strict=True)
-        if candidate.family is Family.PLAIN
-    ]
-    blocks = [tents(values, DELAYS, quantities.drive) @ root for values in plain]
-    return np.concatenate([np.zeros((len(quantities.drive), 0)), *blocks], axis=1)
 
 
 def _free_weights(courses: FloatArray, start: Fitted, whitener: Whitener) -> FloatArray:
@@ -224,9 +214,3 @@ def _free_weights(courses: FloatArray, start: Fitted, whitener: Whitener) -> Flo
         variance = np.square(weights).reshape(-1, size).sum(axis=1) / np.maximum(known_part, 1e-9)
         variance = np.clip(variance, scale * VARIANCE_LIMITS[0], scale * VARIANCE_LIMITS[1])
     return np.asarray(weights * noise)
-
-
-def _squares(whitener: Whitener, values: FloatArray, held: BoolArray) -> FloatArray:
-    """Whitened squares where held, shape (n,), else 0; levels are the held rows' own. [-]"""
-    there = Whitener(whitener.process, held, whitener.drive, whitener.scale)
-    return np.where(held, np.square(there.rows(np.where(held, values, 0.0))), 0.0)

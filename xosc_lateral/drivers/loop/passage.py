@@ -18,8 +18,7 @@ LONGEST_S = 60.0  # Where a column stays for longer, all that there is to see is
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A column, on the 0.2 s grid, that goes from its usual value to a high one and back, and the car's path by the
-    second."""
+    """A column on the 0.2 s grid that goes from its usual value to a high one and back, and the car's path."""
 
     column: FloatArray = field(repr=False)  # shape (fine n,), in its own unit.
     usual: float
@@ -49,14 +48,9 @@ class Passage:
         size, error = self.largest_shift
         return error / max(abs(size), 1e-12)
 
-    def with_path(self, path: FloatArray, error: FloatArray) -> Passage:
-        """The same with where the car is, and how sure that is, shape (n,) each. [m]"""
-        return replace(self, path=path, error=error)
-
 
 def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
-    """From a column's median to its farther 95 % or 5 % quantile, or from none to the median, as long and steep as in
-    the median."""
+    """From a column's median to its farther outer quantile, or from none to it, as long and steep as usual."""
     timeline = coarse.timeline
     values = coarse.context[effect.columns[0]]
     known = timeline.valid & np.isfinite(values)
@@ -72,10 +66,8 @@ def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
     lasts, wide, narrow = (_median_length(away > share, timeline.step) for share in (0.5, 0.25, 0.75))
     ramp = min(max(wide - narrow, timeline.step), lasts)
     knots = BEFORE_S + np.array([0.0, ramp, lasts, lasts + ramp])
-    rows = COARSE * int(np.ceil(knots[-1] + AFTER_S))
-    time = timeline.step * np.arange(rows)
-    column = np.interp(time, knots, [usual, high, high, usual])
-    return Passage(column, float(usual), float(high), float(lasts))
+    time = timeline.step * np.arange(COARSE * int(np.ceil(knots[-1] + AFTER_S)))
+    return Passage(np.interp(time, knots, [usual, high, high, usual]), float(usual), float(high), float(lasts))
 
 
 def passage_of(coarse: Coarse, effect: ColumnEffect, share_of_error: float) -> Passage:
@@ -83,11 +75,10 @@ def passage_of(coarse: Coarse, effect: ColumnEffect, share_of_error: float) -> P
     passage, step = typical_passage(coarse, effect), coarse.timeline.step
     path = coarse_mean(np.asarray(effect.strength(step, {effect.columns[0]: passage.column})))
     path = path - path[0]
-    return passage.with_path(path, np.abs(path) * share_of_error)
+    return replace(passage, path=path, error=np.abs(path) * share_of_error)
 
 
 def _median_length(there: BoolArray, step: float) -> float:
     """Length of the stretch that a second of all stretches lies in, in the median, at most `LONGEST_S`. [s]"""
-    lengths = np.sort([(rows.stop - rows.start) * step for rows in true_slices(there)])
-    half = np.searchsorted(np.cumsum(lengths), 0.5 * lengths.sum()) if len(lengths) else 0
-    return min(float(lengths[half]), LONGEST_S) if len(lengths) else 0.0
+    lengths = np.sort([0.0, *((rows.stop - rows.start) * step for rows in true_slices(there))])
+    return min(float(lengths[np.searchsorted(np.cumsum(lengths), 0.5 * lengths.sum())]), LONGEST_S)

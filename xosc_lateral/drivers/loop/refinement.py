@@ -7,7 +7,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,8 +36,7 @@ LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 
 def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
-    """Whether squared residuals of two white regressions, nested or not, differ by no more than they scatter by
-    cluster."""
+    """Whether squared residuals of two white regressions differ by no more than they scatter by cluster."""
     first, second = (
         np.square(observed - own @ np.linalg.lstsq(own, observed, rcond=None)[0]) for own in (chosen, other)
     )
@@ -55,8 +54,7 @@ class Refined:
 
 
 class Refinement:
-    """Scores many effects at once beside everything `known` (orthonormal, shape (seconds, k)), with each family's
-    `costs`."""
+    """Scores many effects at once beside all that is `known` (orthonormal, shape (seconds, k))."""
 
     def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:
         self._coarse, self._problem, self._costs = coarse, problem, costs
@@ -69,12 +67,15 @@ class Refinement:
     def refine(self, effect: ColumnEffect, price: float, columns: Mapping[str, Column]) -> Refined:
         """Shape, timing, shape again, timing again, each time in finer steps."""
         best = Refined(effect, self.scores([effect])[0] - price, price)
-        best = self._best(best, self._shapes(best.effect, columns))
+        best = self._best(best, list(self._shapes(best.effect, columns)))
         for step in LAG_STEPS:
             responses = RESPONSES if step > LAG_STEPS[-1] else FINE_RESPONSES
-            timings = _timings(best.effect, step, 2.0 * step, responses)
-            best = self._best(best, ((timed, best.price) for timed in timings))
-        return self._best(best, self._shapes(best.effect, columns))
+            distance = np.abs(np.log(np.array(responses) / max(best.effect.response_s, 0.1)))
+            near = [responses[index] for index in np.argsort(distance, kind="stable")[:5]]
+            lags = [round(float(lag), 1) for lag in lags_about(best.effect.lag_s, 2.0 * step, step)]
+            timings = (structs.replace(best.effect, lag_s=lag, response_s=late) for lag in lags for late in near)
+            best = self._best(best, [(timed, best.price) for timed in timings])
+        return self._best(best, list(self._shapes(best.effect, columns)))
 
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
@@ -104,8 +105,7 @@ class Refinement:
         return float(np.square(unit.T @ self._left).sum() - (rows.shape[1] - 1) * np.log(len(self._left)))
 
     def _response(self, effect: ColumnEffect) -> FloatArray:
-        """Response at 1 Hz, standardised, shape (n, k), by the fine grid, as the fit has it: at 1 Hz a lag is another
-        filter."""
+        """Response at 1 Hz, standardised, shape (n, k), by the fine grid: at 1 Hz a lag is another filter."""
         timeline, shape = self._coarse.timeline, structs.replace(effect, lag_s=0.0, response_s=0.0)
         if shape not in self._quantities:
             values = shape.response(timeline.step, self._coarse.context)
@@ -116,17 +116,15 @@ class Refinement:
             self._responses[key] = running_sums(self._coarse, self._quantities[shape], effect.response_s)
         return means_by_second(self._responses[key], round(effect.lag_s / timeline.step))
 
-    def _best(self, best: Refined, others: Iterable[Priced]) -> Refined:
-        several = list(others)
-        if not several:
+    def _best(self, best: Refined, others: Sequence[Priced]) -> Refined:
+        if not others:
             return best
-        scores = np.asarray(self.scores([effect for effect, _ in several])) - [price for _, price in several]
+        scores = np.asarray(self.scores([effect for effect, _ in others])) - [price for _, price in others]
         at = int(np.argmax(scores))
-        return Refined(several[at][0], float(scores[at]), several[at][1]) if scores[at] > best.score else best
+        return Refined(others[at][0], float(scores[at]), others[at][1]) if scores[at] > best.score else best
 
     def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[Priced]:
-        """Other shapes of the column, scales and centres of a product's factors, each with its price: a finer choice
-        costs more."""
+        """Other shapes of a column, scales and centres of a product, with their prices: a finer choice costs more."""
         if isinstance(effect, Product):
             others = [*other_scales(effect, FINE_SCALES), *other_centres(effect, self._coarse)]
             price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))
@@ -147,13 +145,6 @@ def lags_about(lag_s: float, reach: float, step: float) -> FloatArray:
     """Lags within a reach of one, none beyond the longest. [s]"""
     lags = lag_s + np.arange(-reach, reach + 0.5 * step, step)
     return np.asarray(lags[np.abs(lags) <= LAG_LIMIT])
-
-
-def _timings(effect: ColumnEffect, step: float, reach: float, responses: Sequence[float]) -> Iterator[ColumnEffect]:
-    near = sorted(responses, key=lambda response_s: abs(np.log(response_s / max(effect.response_s, 0.1))))[:5]
-    for lag in lags_about(effect.lag_s, reach, step):
-        for response_s in near:
-            yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response_s)
 
 
 def running_sums(coarse: Coarse, quantity: FloatArray, response_s: float) -> FloatArray:
@@ -186,6 +177,5 @@ def other_centres(effect: Product, coarse: Coarse) -> Iterator[Product]:
 
 
 def _with(effect: Product, index: int, at: float) -> Product:
-    factors = list(effect.factors)
-    factors[index] = structs.replace(factors[index], at=at)
-    return structs.replace(effect, factors=(factors[0], factors[1]))
+    first, second = (structs.replace(own, at=at) if k == index else own for k, own in enumerate(effect.factors))
+    return structs.replace(effect, factors=(first, second))

@@ -24,7 +24,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.resampling import in_digits
-from xosc_lateral.drivers.loop.timeline import LOCAL_S, PAD, Timeline, local_mean, missing_throughout, smoothed
+from xosc_lateral.drivers.loop.timeline import LOCAL_S, PAD, Timeline, local_mean, missing_throughout
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.drivers.model.seeds import child
@@ -37,7 +37,8 @@ OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 N_RUNS = 24  # Runs of the profile that its expectation is taken over ...
 FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of which is another sample already.
-DRAWS = 64  # Half samples of the blocks.
+HALF_SAMPLES = 64  # Of the blocks: the standard error of a share of 5 % of them is 3 %.
+TIME_PARTS = 6  # Parts of a drive by which the spread over time is compared: seven minutes of forty.
 LEVEL = 0.05  # Share of them that may be as far off as the refined profile. [-]
 # A group of summary statistics so many times its own sampling error is named when something is left. [-]
 STANDS_OUT = 2.0
@@ -57,7 +58,7 @@ class SummaryStatistics:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""
         timeline = self.timeline
         used = used & timeline.valid
-        slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+        slow = local_mean(offset, timeline.valid, LOCAL_S)
         fast = offset - slow
         statistics: dict[str, FloatArray] = {}
         for name, label in self.labels.items():
@@ -68,7 +69,7 @@ class SummaryStatistics:
         statistics["movement by band"] = _bands(offset, used, timeline)
         if self.oscillation is not None:
             statistics[OSCILLATION] = np.array([_amplitude(offset, used, timeline, self.oscillation)])
-        local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
+        local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S))
         inside = local[used]
         statistics["quantiles of local spread"] = (
             np.quantile(inside, LOCAL_QUANTILES) if len(inside) else np.full(len(LOCAL_QUANTILES), np.nan)
@@ -146,14 +147,13 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 
 
 def half_samples(
-    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator
 ) -> list[dict[str, FloatArray]]:
-    """Random halves of the blocks less all of them, which vary as all about the truth [2]_; of offsets less the mean's
-    effects."""
+    """Random halves of the blocks less all of them, which vary as all about the truth [2]_."""
     valid = statistics.timeline.valid
     numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
     differences = []
-    for _ in range(draws):
+    for _ in range(HALF_SAMPLES):
         rows = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
         half, shares = statistics.describe(offset, rows), statistics.shares(rows)
         # a share p of the rows less all of them has a variance of (1 - p) / p times that of all
@@ -187,8 +187,7 @@ class GroupError:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left after the loop beside the sampling error of what is measured [m], and the share of half samples as
-    far off."""
+    """What is left beside the sampling error of what is measured [m], and the share of half samples as far off."""
 
     floors: Mapping[str, FloatArray]
     groups: tuple[GroupError, ...]
@@ -251,24 +250,23 @@ def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
     if not used.any():
         return np.full(len(BANDS_S) + 1, np.nan)
-    inside = [level[used] for level in (offset, *smoothed(offset, timeline, BANDS_S))]
+    levels = (offset, *(local_mean(offset, timeline.valid, seconds) for seconds in BANDS_S))
+    inside = [level[used] for level in levels]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
 
 
 def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequency: float) -> float:
     """Amplitude of an oscillation of about that frequency: root mean square over drives, of the lines around it. [m]"""
-    squares, rows = 0.0, 0
+    squares = 0.0
     for span in timeline.spans:
-        inside = span.start + np.flatnonzero(used[span])
-        if len(inside) == 0:
-            continue
-        at = (inside - span.start) * timeline.step
-        around = frequency + np.arange(-LINE_WIDTH, LINE_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
-        lines = np.exp(-2j * np.pi * np.outer(around, at)) @ (offset[inside] - offset[inside].mean())
-        squares += float(np.sum(np.abs(2.0 * lines / len(inside)) ** 2)) * len(inside)
-        rows += len(inside)
-    return float(np.sqrt(squares / max(rows, 1)))
+        rows = np.flatnonzero(used[span])
+        if len(rows):
+            seen = offset[span][rows]
+            around = frequency + np.arange(-LINE_WIDTH, LINE_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
+            lines = np.exp(-2j * np.pi * np.outer(around, rows * timeline.step)) @ (seen - seen.mean())
+            squares += float(np.sum(np.abs(2.0 * lines / len(rows)) ** 2)) * len(rows)
+    return float(np.sqrt(squares / max(int(used.sum()), 1)))
 
 
 def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntArray, FloatArray]:
@@ -285,15 +283,15 @@ def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntA
     return label.astype(np.intp), middle
 
 
-def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray]:
+def _time_bins(timeline: Timeline) -> tuple[IntArray, FloatArray]:
     label = np.full(len(timeline), -1, dtype=np.intp)
     for span in timeline.spans:
         rows = np.arange(span.start, span.stop)
         inside = rows[timeline.valid[rows]]
         if len(inside):
             share = (rows - inside[0]) / max(1, inside[-1] - inside[0] + 1)
-            label[rows] = np.clip((share * parts).astype(np.intp), 0, parts - 1)
-    return label, (np.arange(parts) + 0.5) / parts
+            label[rows] = np.clip((share * TIME_PARTS).astype(np.intp), 0, TIME_PARTS - 1)
+    return label, (np.arange(TIME_PARTS) + 0.5) / TIME_PARTS
 
 
 def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:

@@ -9,8 +9,7 @@ from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.loop import terms
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.model import Fitted, Stage, Term
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Fitted, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.significance import BUDGET
 
 # Every term that a file of `terms` defines, by the file's name.

@@ -37,6 +37,9 @@ COUNTED_DRAWS = 10
 CHI_SQUARE_EXCESS = 2.0
 # From so many drives on a table tells what differs between them, and its null is drawn by whole drives.
 MANY_DRIVES = 20
+NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
+LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
+BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
 
 
 def upper_tail(
@@ -81,15 +84,6 @@ def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
     from scipy.stats import chi2
 
     return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), MINIMUM_P), 1))
-
-
-NULL_DRAWS = 400  # Rotated or re-signed residuals that the null is taken from.
-
-
-LEAST_SHIFT_S = 60  # No rotation is shorter: a driver's response must be out of reach. [s]
-
-
-BLOCK_S = 300  # Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]
 
 
 def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:

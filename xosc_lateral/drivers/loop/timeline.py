@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.cuts import CutRules
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.gridding import GriddedDrive, grid_drives
+from xosc_lateral.drivers.drives.gridding import grid_drives
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.effects.response import respond
@@ -73,8 +72,7 @@ class Timeline:
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
-        """`effects.response.respond` drive by drive, of `values`, shape (n,) or (n, k): a lag of a minute outlasts the
-        pad."""
+        """`effects.response.respond` drive by drive, of `values`, shape (n,) or (n, k), whatever the lag."""
         response = respond(values, self.step, lag_s, response_s)
         if response_s <= 0.0:
             return response
@@ -100,11 +98,6 @@ def missing_throughout(values: FloatArray, timeline: Timeline) -> BoolArray:
     return gone if there.any() else np.zeros(len(values), dtype=np.bool_)
 
 
-def smoothed(offset: FloatArray, timeline: Timeline, times_s: Sequence[float]) -> list[FloatArray]:
-    """Moving averages of a series over each of several times, shape (n,) each, in its unit."""
-    return [local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in times_s]
-
-
 def unsized(effect: ColumnEffect) -> ColumnEffect:
     """The same effect before it was fitted."""
     return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
@@ -126,18 +119,17 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
         offset=np.concatenate([part.offset for part in kept]),
         valid=np.concatenate([part.valid for part in kept]),
         lane_width=np.concatenate([part.lane_width for part in kept]),
-        context=MappingProxyType({name: np.concatenate([_column(part, name) for part in kept]) for name in names}),
+        # a drive that never met one has no such column: there is none, all along
+        context={
+            name: np.concatenate([part.context.get(name, np.full(len(part), np.nan)) for part in kept])
+            for name in names
+        },
         levels=frozenset.intersection(*(part.levels for part in kept)),
         periods=periods,
         of_one_camera=frozenset({"lane_width"} if any(drive.mended for drive in drives) else ()),
         valid_below=min((drive.valid_below for drive in drives if drive.valid_below is not None), default=None),
         resolution=max((drive.resolution for drive in drives if drive.resolution is not None), default=None),
     )
-
-
-def _column(part: GriddedDrive, name: str) -> FloatArray:
-    """A drive that never met one has no such column: there is none, all along."""
-    return part.context[name] if name in part.context else np.full(len(part), np.nan)
 
 
 def coarse_mean(values: FloatArray) -> FloatArray:
@@ -155,14 +147,6 @@ def coarse_all(mask: BoolArray) -> BoolArray:
     """Whether the whole second is valid, shape (n // 5,)."""
     n = len(mask) // COARSE
     return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
-
-
-def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
-    """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
-    drives = int(drive.max()) + 1
-    count = np.bincount(drive, valid.astype(float), minlength=drives)
-    sums = np.bincount(drive, np.where(valid, values, 0.0), minlength=drives)
-    return np.asarray(sums / np.maximum(count, 1.0))
 
 
 def start_anew(
@@ -184,9 +168,9 @@ def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
     return np.asarray(values[low] * (1.0 - share) + values[np.minimum(low + 1, len(values) - 1)] * share)
 
 
-def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
-    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
-    half = max(1, round(0.5 * seconds / step))
+def local_mean(values: FloatArray, valid: BoolArray, seconds: float) -> FloatArray:
+    """Moving average on the 0.2 s grid over the valid rows within `seconds`, shape (n,); 0 where there are none."""
+    half = max(1, round(0.5 * seconds / STEP))
     sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
     counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
     index = np.arange(len(values))
@@ -213,13 +197,16 @@ class Coarse:
     def of(cls, timeline: Timeline) -> Coarse:
         """Average to 1 Hz."""
         columns = {"lane_width": timeline.lane_width, **timeline.context}
+        for name, values in columns.items():
+            if len(seen := values[timeline.valid & np.isfinite(values)]):
+                columns[name] = np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max()))
         return cls(
             timeline,
             coarse_mean(timeline.offset),
             coarse_all(timeline.valid),
             coarse_middle(timeline.drive),
             coarse_mean(timeline.time),
-            {name: _within(values, timeline.valid) for name, values in columns.items()},
+            columns,
         )
 
     def __len__(self) -> int:
@@ -229,7 +216,7 @@ class Coarse:
         """The same with fewer valid rows; `rows`: shape (n,)."""
         return replace(self, valid=self.valid & rows, _responses={})
 
-    @property
+    @cached_property
     def drives(self) -> int:
         """Number of drives."""
         return int(self.drive.max()) + 1
@@ -270,9 +257,6 @@ class Coarse:
 
     def by_drive(self, values: FloatArray) -> FloatArray:
         """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
-        return means_by_drive(values, self.valid, self.drive)
-
-
-def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
-    seen = values[valid & np.isfinite(values)]
-    return np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max())) if len(seen) else values
+        count = np.bincount(self.drive, self.valid.astype(float), minlength=self.drives)
+        sums = np.bincount(self.drive, np.where(self.valid, values, 0.0), minlength=self.drives)
+        return np.asarray(sums / np.maximum(count, 1.0))

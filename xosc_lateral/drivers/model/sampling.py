@@ -6,7 +6,7 @@ same however a drive is cut into blocks. A drive is sampled segment after segmen
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any, NamedTuple, Self
 
@@ -18,7 +18,6 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.core.base import CoreStream, Start
 from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.drivers.model.effects.base import step_of
-from xosc_lateral.drivers.model.effects.response import ResponseState
 from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import read_as
@@ -131,7 +130,7 @@ class DriveState(msgspec.Struct, kw_only=True):
     terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * len(EffectTerms().parts))
     first: int = 0
     drawn: int = 0
-    coarse: FloatArray  # Core movement drawn ahead, as is `fine`, shape (k,). [lane widths]
+    coarse: FloatArray  # Drawn ahead, as is `fine`, by a stream that 0.2 saved, shape (k,). [lane widths]
     fine: FloatArray
 
 
@@ -154,11 +153,10 @@ def offsets_of(profile: DriverProfile, movement: Movement, terms: EffectTerms, w
 
 
 class DriveProcess:
-    """One drive; what is random is drawn `ahead` by so many rows, to be quick with blocks of a single row."""
+    """One drive: what is random of it, and what that makes of the effects."""
 
-    def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
+    def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence) -> None:
         self._profile, self._model, self._seed = profile, profile.model, seed
-        self._ahead = self._core_ahead = ahead
         for effect in profile.effects:
             if not isinstance(effect, HiddenEffect | ColumnEffect):
                 raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
@@ -189,10 +187,6 @@ class DriveProcess:
         if self.state.begun_at is None:
             self.state.begun_at = time
 
-    def draw_nothing_ahead(self) -> None:
-        """An effect on the rate of mean reversion is known to come: what it acts on must not be drawn yet."""
-        self._core_ahead = 0
-
     def hidden_terms(self, time: FloatArray) -> EffectTerms:
         """What the hidden effects do together at times of the drive, which begins at the first one ever asked for.
 
@@ -212,14 +206,13 @@ class DriveProcess:
         if low < state.first:
             raise ValueError(f"row {low} of a drive that has gone on to row {state.first}")
         if high > state.drawn:
-            self._draw_hidden(max(high, state.drawn + self._ahead))
+            self._draw_hidden(high)
         terms = EffectTerms(*state.terms)
         if high - low == len(rows):
             taken = terms.rows(slice(low - state.first, high - state.first))
         else:  # a segment whose step is a little off the model's
             taken = terms.rows(rows - state.first)
-        done = high - 1 - state.first  # the last row stays: the next segment may begin with it
-        if done >= max(self._ahead, 1):
+        if (done := high - 1 - state.first) > 0:  # the last row stays: the next segment may begin with it
             state.terms = [None if values is None else values[done:] for values in state.terms]
             state.first += done
         return taken
@@ -241,10 +234,7 @@ class DriveProcess:
         Raises `ValueError` if the first offset `start` [m] is given in the middle of a drive.
         """
         if self._core is None:
-            self._core = self._model.stream(
-                child(self._seed, DriveSeed.CORE), _start(self._profile, start, width, terms)
-            )
-            self.state.core = self._core.state
+            self._begin(_start(self._profile, start, width, terms))
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
         return offsets_of(self._profile, self.movement(len(width), terms.rate), terms, width)
@@ -254,23 +244,20 @@ class DriveProcess:
 
         A drive that has not begun begins as chance has it.
         """
-        if self._core is None:
-            self._core = self._model.stream(child(self._seed, DriveSeed.CORE), None)
-            self.state.core = self._core.state
-        return Movement(self._core.mean, *self._take_core(self._core, n, rate))
-
-    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Next rows of the core movement."""
-        state = self.state
-        if rate is not None or not (self._core_ahead or len(state.coarse)):
-            return core.take(n, rate)
-        missing = n - len(state.coarse)
-        if missing > 0:
-            coarse, fine = core.take(max(missing, self._core_ahead))
-            state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
-        taken = state.coarse[:n], state.fine[:n]
+        core, state = self._core or self._begin(None), self.state
+        if not len(state.coarse):
+            return Movement(core.mean, *core.take(n, rate))
+        drawn = [state.coarse[:n], state.fine[:n]]
         state.coarse, state.fine = state.coarse[n:], state.fine[n:]
-        return taken
+        if len(drawn[0]) < n:
+            more = core.take(n - len(drawn[0]), rate)
+            drawn = [np.concatenate(parts) for parts in zip(drawn, more, strict=True)]
+        return Movement(core.mean, *drawn)
+
+    def _begin(self, start: Start | None) -> CoreStream:
+        self._core = self._model.stream(child(self._seed, DriveSeed.CORE), start)
+        self.state.core = self._core.state
+        return self._core
 
     def restore(self, values: Any, where: str) -> None:
         """Go on from a state as plain JSON values.
@@ -286,41 +273,6 @@ class DriveProcess:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
         self.state = state
-
-
-class ResponseStreamState(msgspec.Struct, forbid_unknown_fields=True):
-    """The response to one effect's columns: where it is, rows that are ready, and how many of these are dropped."""
-
-    response: ResponseState
-    ready: list[FloatArray]
-    drop: int
-
-
-class ResponseStream:
-    """A driver's response to one effect's columns, row by row; `ahead` are the rows of its preview."""
-
-    def __init__(self, effect: ColumnEffect, step: float) -> None:
-        self.effect = effect
-        self._response = effect.response_in_blocks(step)
-        self.ahead = self._response.ahead
-        self.state = ResponseStreamState(self._response.state, [], 0)
-
-    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
-        """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""
-        state = self.state
-        state.drop += before
-        state.ready.extend(self._response.take(self.effect.known(row)))
-        dropped = min(state.drop, len(state.ready))
-        del state.ready[:dropped]
-        state.drop -= dropped
-
-    def next(self) -> EffectTerms:
-        """Terms at the next row, each of shape (1,)."""
-        return self.effect.acting(self.state.ready.pop(0)[None, :])
-
-    def restore(self, state: ResponseStreamState) -> None:
-        """Back to a state."""
-        self.state, self._response.state = state, state.response
 
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:

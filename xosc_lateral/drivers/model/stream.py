@@ -1,7 +1,7 @@
 """Offsets one by one, as a test bench asks for them: the batch call's numbers, in constant time and memory per step.
 
-What is random needs no context and is drawn ahead in blocks. What depends on context is worked out once per step of
-the model (5 Hz), on that moment's context; a bench that runs faster gets the curve of `upsampling` in between.
+A driver alone is a group of one (`group`), who may know what lies ahead. What depends on context is worked out once per
+step of the model (5 Hz), on that moment's context; a bench that runs faster gets the curve of `linear_filters` between.
 """
 
 from __future__ import annotations
@@ -15,16 +15,12 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.model.effects import Acts
+from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.drivers.model.group import DriverState, OffsetGroup, ResponseStreamState, rows_ahead
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
 from xosc_lateral.drivers.model.plausibility import check_context
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.records import plain, read_as
-from xosc_lateral.drivers.model.sampling import DriveProcess, ResponseStream, ResponseStreamState, combine
-
-BLOCK = 64
-"""Model steps drawn at once. [-]"""
-
 
 FORMAT = "xosc-lateral offset stream"
 
@@ -67,7 +63,10 @@ class StreamState(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     responses: list[ResponseStreamState] = msgspec.field(name="answers", default_factory=list)
     """Of the effects whose columns are known."""
     process: Any = None
-    """`DriveState`."""
+    """`DriveState`; None before the first context."""
+    mean: float = 0.0
+    """As `drawn`, see `group.DriverState`; states of 0.2 have neither, and their rows drawn ahead in `process`."""
+    drawn: list[list[float]] = msgspec.field(default_factory=list)
 
 
 class OffsetStream:
@@ -115,13 +114,9 @@ class OffsetStream:
         self._begin_with(profile, sequence, StreamState(seed=seeded, factor=factor, start=start, time=time))
 
     def _begin_with(self, profile: DriverProfile, seed: np.random.SeedSequence, state: StreamState) -> None:
-        self.profile, self._state = profile, state
-        self._process = DriveProcess(profile, seed, ahead=BLOCK)
-        self._process.begin_at(state.time)
-        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
-        self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
-            SAMPLES_AHEAD if state.factor > 1 else 0
-        )
+        self.profile, self._seed, self._state = profile, seed, state
+        self._ahead = rows_ahead(profile) + (SAMPLES_AHEAD if state.factor > 1 else 0)
+        self._driver: OffsetGroup | None = None
 
     @property
     def preview(self) -> float:
@@ -221,38 +216,34 @@ class OffsetStream:
         self._state.widths.append(float(context.get("lane_width", self.profile.lane_width)))
 
     def _see(self, context: Mapping[str, float], *, before: bool = False) -> None:
-        """Let the effects see one more row of context, of the drive or from before it."""
-        if self._state.known is None:
-            columns = {column for response in self._responses for column in response.effect.columns}
-            self._know(tuple(sorted(columns & context.keys())))
-        assert self._state.known is not None
-        row = {column: np.array([context[column]], dtype=np.float64) for column in self._state.known}
-        for response in self._responses:
-            response.take(row, before=before)
-
-    def _know(self, columns: tuple[str, ...]) -> None:
-        """From now on these columns of the context count."""
-        self._state.known = columns
-        self._responses = tuple(
-            response for response in self._responses if set(response.effect.columns) <= set(columns)
+        """Let the driver see one more row of context, of the drive or from before it; the first says what counts."""
+        if self._driver is None:
+            read = {
+                name for effect in self.profile.effects if isinstance(effect, ColumnEffect) for name in effect.columns
+            }
+            self._state.known = tuple(sorted(read & context.keys()))
+            self._driver = OffsetGroup(self.profile, self._state.known, sees_ahead=True)
+            self._driver.add([self._seed], self._state.time)
+        self._driver.see(
+            {name: np.array([context[name]], dtype=np.float64) for name in self._driver.columns}, before=before
         )
-        if any(response.effect.acts is Acts.RATE for response in self._responses):
-            self._process.draw_nothing_ahead()
 
     def _sample(self) -> float:
         """The next offset at the model's step; the context that it needs has been taken."""
+        assert self._driver is not None
         state = self._state
-        hidden = self._process.hidden_terms_at(np.array([state.row]))
-        terms = combine([hidden, *(response.next() for response in self._responses)])
-        offset = self._process.take(terms, np.array([state.widths.pop(0)]), None if state.row else state.start)
+        offset = self._driver.sample(np.array([state.widths.pop(0)]), None if state.row else state.start)
         state.row += 1
         return float(offset[0])
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain JSON values; `from_dict` goes on from it with the same profile."""
         state = self._state
-        state.profile, state.process = sampling_hash(self.profile), self._process.state
-        state.responses = [response.state for response in self._responses]
+        state.profile = sampling_hash(self.profile)
+        if self._driver is not None:
+            (driver,) = self._driver.driver_states()
+            state.process, state.mean, state.drawn = driver.process, driver.mean, driver.drawn
+            state.responses = [response.state for response in self._driver.responses]
         return sealed(plain(state))
 
     @classmethod
@@ -278,10 +269,9 @@ class OffsetStream:
         seed = np.random.SeedSequence(saved.seed.entropy, spawn_key=saved.seed.spawn_key)
         stream._begin_with(profile, seed, saved)
         if saved.known is not None:
-            stream._know(saved.known)
-        for response, response_state in zip(stream._responses, saved.responses, strict=True):
-            response.restore(response_state)
-        stream._process.restore(saved.process, "state.process")
+            stream._driver = OffsetGroup(profile, saved.known, sees_ahead=True)
+            driver = DriverState(process=saved.process, mean=saved.mean, drawn=saved.drawn, row=saved.row)
+            stream._driver.go_on_from([driver], saved.responses, [seed])
         return stream
 
 

@@ -17,11 +17,13 @@ from xosc_lateral.files.openscenario.entities import (
 )
 from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.world.scenario import private_actions as private
 from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
 from xosc_lateral.world.scenario.enums import DynamicsShape
 from xosc_lateral.world.scenario.global_actions import (
     AddEntityAction,
     DeleteEntityAction,
+    Environment,
     EnvironmentAction,
     ModifyOperation,
     ParameterModifyAction,
@@ -36,28 +38,7 @@ from xosc_lateral.world.scenario.global_actions import (
 )
 from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.private_actions import (
-    AcquirePositionAction,
-    ActivateControllerAction,
-    AnimationAction,
-    AssignControllerAction,
-    AssignRouteAction,
-    ConnectTrailerAction,
-    DisconnectTrailerAction,
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    LightStateAction,
-    LongitudinalDistanceAction,
-    OverrideControllerValueAction,
-    SpeedAction,
-    SpeedProfileAction,
-    SynchronizeAction,
-    TeleportAction,
-    TransitionDynamics,
-    VisibilityAction,
-)
+from xosc_lateral.world.scenario.private_actions import TransitionDynamics
 from xosc_lateral.world.scenario.scenario import (
     Action,
     Actors,
@@ -112,10 +93,6 @@ def _contents(owner: XmlElement) -> list[XmlElement]:
     return elements
 
 
-def _environment(e: XmlElement, context: Context) -> EnvironmentAction:
-    return EnvironmentAction(read_environment(e, context), place=e.place())
-
-
 def _entity(e: XmlElement, context: Context) -> AddEntityAction | DeleteEntityAction:
     if (add := e.child("AddEntityAction")) is not None:
         return AddEntityAction(context.entity(e), read_position(add.required("Position"), context), place=e.place())
@@ -148,8 +125,7 @@ def _user_defined(e: XmlElement, _: Context) -> UserDefinedAction:
 
 
 GLOBAL_ACTIONS: dict[str, Reader] = {
-    **declared(SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
-    "EnvironmentAction": _environment,
+    **declared(EnvironmentAction, SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
     "EntityAction": _entity,
     "ParameterAction": _setting(ParameterSetAction, ParameterModifyAction),
     "VariableAction": _setting(VariableSetAction, VariableModifyAction),
@@ -159,42 +135,35 @@ GLOBAL_ACTIONS: dict[str, Reader] = {
 
 
 # ---- private actions: what their structs declare is read by that, the others by functions ----
-def _teleport(e: XmlElement, context: Context) -> TeleportAction:
+def _teleport(e: XmlElement, context: Context) -> private.TeleportAction:
     # 1.0 files in the field put the position right into the action.
-    return TeleportAction(read_position(e.child("Position") or e, context), place=e.place())
+    return private.TeleportAction(read_position(e.child("Position") or e, context), place=e.place())
 
 
-def _speed_profile(e: XmlElement, context: Context) -> SpeedProfileAction:
+def _speed_profile(e: XmlElement, context: Context) -> private.SpeedProfileAction:
     if e.child("SpeedProfileEntry") is None:
         e.fail("a speed profile needs an entry")
     reference = context.entity(e) if e.optional_text("entityRef") else None
-    return read_struct(SpeedProfileAction, e, context, entity_ref=reference)
+    return read_struct(private.SpeedProfileAction, e, context, entity_ref=reference)
 
 
-def _lane_offset(e: XmlElement, context: Context) -> LaneOffsetAction:
+def _lane_offset(e: XmlElement, context: Context) -> private.LaneOffsetAction:
     dynamics = e.required("LaneOffsetActionDynamics")
     shape = dynamics.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
     most = dynamics.optional_number("maxLateralAcc", finite=False)
-    action = read_struct(LaneOffsetAction, e, context, shape=shape, max_lateral_acc=most)
+    action = read_struct(private.LaneOffsetAction, e, context, shape=shape, max_lateral_acc=most)
     return replace(action, target=replace(action.target, value=-action.target.value)) if context.left_handed else action
 
 
-def _override(e: XmlElement, _: Context) -> OverrideControllerValueAction:
+def _override(e: XmlElement, _: Context) -> private.OverrideControllerValueAction:
     overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
-    return OverrideControllerValueAction(overrides, place=e.place())
+    return private.OverrideControllerValueAction(overrides, place=e.place())
 
 
-def _light_state(e: XmlElement, context: Context) -> LightStateAction:
-    kind, state = e.child("LightType"), e.child("LightState")
-    light = None if kind is None else kind.child()
-    name = "" if light is None else light.optional_text("vehicleLightType") or light.text("userDefinedLightType", "")
-    return read_struct(LightStateAction, e, context, light=name, mode="" if state is None else state.text("mode", ""))
-
-
-def _animation(e: XmlElement, context: Context) -> AnimationAction:
+def _animation(e: XmlElement, context: Context) -> private.AnimationAction:
     owner = e.child("AnimationType")
     content = None if owner is None else owner.child()
-    return read_struct(AnimationAction, e, context, kind=content.tag if content else "")
+    return read_struct(private.AnimationAction, e, context, kind=content.tag if content else "")
 
 
 def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
@@ -205,14 +174,15 @@ def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
 
 
 PRIVATE_ACTIONS: dict[str, Reader] = {
-    **declared(SpeedAction, LongitudinalDistanceAction, LaneChangeAction, LateralDistanceAction, SynchronizeAction),
-    **declared(FollowTrajectoryAction, AssignRouteAction, AcquirePositionAction, AssignControllerAction),
-    **declared(ActivateControllerAction, VisibilityAction, ConnectTrailerAction, DisconnectTrailerAction),
+    **declared(private.SpeedAction, private.LongitudinalDistanceAction, private.SynchronizeAction),
+    **declared(private.LaneChangeAction, private.LateralDistanceAction, private.FollowTrajectoryAction),
+    **declared(private.AssignRouteAction, private.AcquirePositionAction, private.AssignControllerAction),
+    **declared(private.ActivateControllerAction, private.ConnectTrailerAction, private.DisconnectTrailerAction),
+    **declared(private.VisibilityAction, private.LightStateAction),
     "TeleportAction": _teleport,
     "SpeedProfileAction": _speed_profile,
     "LaneOffsetAction": _lane_offset,
     "OverrideControllerValueAction": _override,
-    "LightStateAction": _light_state,
     "AnimationAction": _animation,
 }
 
@@ -269,6 +239,7 @@ READERS: dict[object, Reader] = {
     **POSITION_READERS,
     BoundingBox: read_bounding_box,
     Controller: read_controller,
+    Environment: read_environment,
     Event: _read_event,
     Init: _read_init,
     ManeuverGroup: _read_group,

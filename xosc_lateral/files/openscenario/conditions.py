@@ -6,32 +6,7 @@ from xosc_lateral.files.openscenario.context import Context, Reader, declared, r
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.entities import read_date_time
 from xosc_lateral.files.openscenario.positions import read_position
-from xosc_lateral.world.scenario.conditions import (
-    AccelerationCondition,
-    AngleCondition,
-    CollisionCondition,
-    DistanceCondition,
-    EndOfRoadCondition,
-    OffroadCondition,
-    ParameterCondition,
-    ReachPositionCondition,
-    RelativeAngleCondition,
-    RelativeClearanceCondition,
-    RelativeDistanceCondition,
-    RelativeSpeedCondition,
-    SimulationTimeCondition,
-    SpeedCondition,
-    StandStillCondition,
-    StoryboardElementStateCondition,
-    TimeHeadwayCondition,
-    TimeOfDayCondition,
-    TimeToCollisionCondition,
-    TrafficSignalCondition,
-    TrafficSignalControllerCondition,
-    TraveledDistanceCondition,
-    UserDefinedValueCondition,
-    VariableCondition,
-)
+from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.scenario import Condition, ConditionGroup, Trigger, TriggeringEntities
@@ -62,43 +37,45 @@ def _read_condition(element: XmlElement, context: Context) -> Condition:
     return read_struct(Condition, element, context, content=content, triggering_entities=triggering)
 
 
-def _collision(e: XmlElement, context: Context) -> CollisionCondition:
+def _collision(e: XmlElement, context: Context) -> conditions.CollisionCondition:
     reference, by_type = e.child("EntityRef"), e.child("ByType")
     if reference is None and by_type is None:
         e.fail("contains neither EntityRef nor ByType")
-    return CollisionCondition(
+    return conditions.CollisionCondition(
         None if reference is None else context.entity(reference),
         None if by_type is None else by_type.choice("type", EntityCategory),
         place=e.place(),
     )
 
 
-def _time_to_collision(e: XmlElement, context: Context) -> TimeToCollisionCondition:
+def _time_to_collision(e: XmlElement, context: Context) -> conditions.TimeToCollisionCondition:
     owner = e.required("TimeToCollisionConditionTarget")
     reference = owner.child("EntityRef")
     if reference is not None:
-        return read_struct(TimeToCollisionCondition, e, context, target=context.entity(reference))
+        return read_struct(conditions.TimeToCollisionCondition, e, context, target=context.entity(reference))
     target = read_position(owner.required("Position"), context)
-    return read_struct(TimeToCollisionCondition, e, context, target=target)
+    return read_struct(conditions.TimeToCollisionCondition, e, context, target=target)
 
 
-def _time_of_day(e: XmlElement, context: Context) -> TimeOfDayCondition:
+def _time_of_day(e: XmlElement, context: Context) -> conditions.TimeOfDayCondition:
     moment = read_date_time(e)
     if moment is None:
         e.fail(f"dateTime='{e.text('dateTime')}' is not a date and time")
-    return read_struct(TimeOfDayCondition, e, context, date_time=moment)
+    return read_struct(conditions.TimeOfDayCondition, e, context, date_time=moment)
 
 
 ENTITY_CONDITIONS: dict[str, Reader] = {
-    **declared(EndOfRoadCondition, OffroadCondition, TimeHeadwayCondition, AccelerationCondition, StandStillCondition),
-    **declared(SpeedCondition, RelativeSpeedCondition, TraveledDistanceCondition, ReachPositionCondition),
-    **declared(DistanceCondition, RelativeDistanceCondition, RelativeClearanceCondition, AngleCondition),
-    **declared(RelativeAngleCondition),
+    **declared(conditions.EndOfRoadCondition, conditions.OffroadCondition, conditions.StandStillCondition),
+    **declared(conditions.SpeedCondition, conditions.RelativeSpeedCondition, conditions.AccelerationCondition),
+    **declared(conditions.TraveledDistanceCondition, conditions.ReachPositionCondition, conditions.DistanceCondition),
+    **declared(conditions.RelativeDistanceCondition, conditions.RelativeClearanceCondition),
+    **declared(conditions.TimeHeadwayCondition, conditions.AngleCondition, conditions.RelativeAngleCondition),
     "CollisionCondition": _collision,
     "TimeToCollisionCondition": _time_to_collision,
 }
 VALUE_CONDITIONS: dict[str, Reader] = {
-    **declared(ParameterCondition, VariableCondition, SimulationTimeCondition, StoryboardElementStateCondition),
-    **declared(TrafficSignalCondition, TrafficSignalControllerCondition, UserDefinedValueCondition),
+    **declared(conditions.ParameterCondition, conditions.VariableCondition, conditions.UserDefinedValueCondition),
+    **declared(conditions.SimulationTimeCondition, conditions.StoryboardElementStateCondition),
+    **declared(conditions.TrafficSignalCondition, conditions.TrafficSignalControllerCondition),
     "TimeOfDayCondition": _time_of_day,
 }

@@ -22,6 +22,9 @@ from xosc_lateral.world.scenario.position import Position, Shape
 S = TypeVar("S", bound=Struct)
 R = TypeVar("R")
 
+ZERO_DECIMALS = ".0000000000"
+"""Of the id of a road that came out of an expression or a number parameter: ids are text, in their plain form."""
+
 MAX_NESTING = 20
 """Routes in positions in routes ...: bounds the recursion."""
 
@@ -165,6 +168,8 @@ def _value(e: XmlElement, name: str, kind: type[Any], xml: Xml, context: Context
         return None if e.raw(name) is None else context.entity(e, name)
     if xml.is_parameter:
         return parameter_name(e.raw(name) or e.text(name))
+    if xml.is_road:
+        return e.text(name).removesuffix(ZERO_DECIMALS)
     if issubclass(kind, StrEnum):
         return e.optional_choice(name, kind)
     if kind is bool:
@@ -176,7 +181,7 @@ def _value(e: XmlElement, name: str, kind: type[Any], xml: Xml, context: Context
 
 def _below(e: XmlElement | None, above: list[str]) -> XmlElement | None:
     for tag in above:
-        e = None if e is None else e.child(tag)
+        e = None if e is None else e.child(*() if tag == "*" else (tag,))
     return e
 
 

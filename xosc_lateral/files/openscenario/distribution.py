@@ -21,20 +21,8 @@ from xosc_lateral.files.openscenario.declarations import broken_constraint, decl
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.read import open_scenario, read_header
 from xosc_lateral.files.xml import read_xml
-from xosc_lateral.world.scenario.distribution import (
-    Deterministic,
-    DistributionError,
-    Histogram,
-    LogNormal,
-    Normal,
-    ParameterSet,
-    Poisson,
-    SteppedRange,
-    Stochastic,
-    Uniform,
-    ValueSets,
-    Weighted,
-)
+from xosc_lateral.world.scenario import distribution as spread
+from xosc_lateral.world.scenario.distribution import Deterministic, ParameterSet, SteppedRange, Stochastic, ValueSets
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place
 
@@ -100,7 +88,7 @@ class LogicalScenario:
         for _ in range(MAX_REDRAWS):
             try:
                 values = distribution.sample(rng)
-            except DistributionError as error:
+            except spread.DistributionError as error:
                 raise self.place.error(str(error)) from error
             if self._accepts(values):
                 return values
@@ -222,10 +210,10 @@ def _seed(owner: XmlElement) -> int | None:
 
 
 _DRAWS: Mapping[str, type[Struct]] = {
-    "ProbabilityDistributionSet": Weighted,
-    "Histogram": Histogram,
-    "UniformDistribution": Uniform,
-    "NormalDistribution": Normal,
-    "LogNormalDistribution": LogNormal,
-    "PoissonDistribution": Poisson,
+    "ProbabilityDistributionSet": spread.Weighted,
+    "Histogram": spread.Histogram,
+    "UniformDistribution": spread.Uniform,
+    "NormalDistribution": spread.Normal,
+    "LogNormalDistribution": spread.LogNormal,
+    "PoissonDistribution": spread.Poisson,
 }

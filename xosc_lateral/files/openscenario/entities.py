@@ -35,10 +35,10 @@ def read_environment(owner: XmlElement, context: Context) -> Environment:
     )
 
 
-def read_date_time(element: XmlElement, name: str = "dateTime") -> datetime | None:
+def read_date_time(element: XmlElement) -> datetime | None:
     """Local date and time without zone; None if it can't be understood."""
     try:
-        return datetime.fromisoformat(element.text(name).strip()).replace(tzinfo=None)
+        return datetime.fromisoformat(element.text("dateTime").strip()).replace(tzinfo=None)
     except ValueError:
         return None
 
@@ -56,10 +56,10 @@ def _weather(element: XmlElement, context: Context) -> Weather:
     rain = element.child("Precipitation")
     intensity = None if rain is None else rain.optional_number("precipitationIntensity")
     stated = None if rain is None else rain.optional_number("intensity")
-    if context.version == (1, 0):
-        return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=stated)
-    intensity = stated if intensity is None else intensity
-    return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=None)
+    fraction = stated if context.version == (1, 0) else None
+    if context.version != (1, 0) and intensity is None:
+        intensity = stated
+    return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=fraction)
 
 
 USUAL_ACCELERATION = 10.0
@@ -71,8 +71,6 @@ CATEGORIES = {
     "MiscObject": EntityCategory.MISC,
     "ExternalObjectReference": EntityCategory.EXTERNAL,
 }
-
-_KIND_ATTRIBUTE = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory", "MiscObject": "miscObjectCategory"}
 
 
 def read_entities(root: XmlElement, context: Context) -> tuple[Entity, ...]:
@@ -86,11 +84,7 @@ def read_entities(root: XmlElement, context: Context) -> tuple[Entity, ...]:
             owner.fail(f"two entities are called '{entity.name}'")
         context.entities.add(entity.name)
     context.selections = _read_selections(owner, entities, context)
-    return tuple(_check_trailer(entity, context) for entity in entities)
-
-
-def _check_trailer(entity: Entity, context: Context) -> Entity:
-    return entity if entity.trailer is None or entity.trailer in context.entities else replace(entity, trailer=None)
+    return tuple(entity if entity.trailer in context.entities else replace(entity, trailer=None) for entity in entities)
 
 
 def _read_selections(owner: XmlElement, entities: list[Entity], context: Context) -> dict[str, tuple[str, ...]]:
@@ -139,9 +133,11 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
         category=category,
         place=item.place(),
         vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
-        controllers=_controllers(item, context),
-        object_name=content.text("name", ""),
-        kind=content.text(_KIND_ATTRIBUTE[content.tag], "") if content.tag in _KIND_ATTRIBUTE else "",
+        controllers=tuple(
+            replace(controller, object_name=owner.optional_text("name"))
+            for owner in item.children("ObjectController")
+            if (controller := read_controller(owner, context)) is not None
+        ),
         trailer=trailer,
         hitch_x=_coupling(content, "TrailerHitch"),
         coupler_x=_coupling(content, "TrailerCoupler"),
@@ -216,22 +212,12 @@ def read_performance(element: XmlElement, context: Context) -> Performance:
     for name in ("maxAcceleration", "maxDeceleration"):
         if element.optional_text(name) is None:
             context.remark(element, f"{name} is missing: {USUAL_ACCELERATION:g} m/s2 is taken")
-    names = (*usual, "maxAccelerationRate", "maxDecelerationRate")
-    limits = [element.number(name, usual.get(name, inf), finite=False) for name in names]
-    for name, limit in zip(names, limits, strict=True):
+    usual |= {"maxAccelerationRate": inf, "maxDecelerationRate": inf}
+    limits = {name: element.number(name, limit, finite=False) for name, limit in usual.items()}
+    for name, limit in limits.items():
         if not limit >= 0.0:
             element.fail(f"{name} {limit:g}, expected 0 or more")
-    return Performance(*limits)
-
-
-def _controllers(item: XmlElement, context: Context) -> tuple[Controller, ...]:
-    """Controllers of ObjectController elements (several from 1.3 on)."""
-    entries = []
-    for owner in item.children("ObjectController"):
-        controller = read_controller(owner, context)
-        if controller is not None:
-            entries.append(replace(controller, object_name=owner.optional_text("name")))
-    return tuple(entries)
+    return Performance(*limits.values())
 
 
 def read_controller(owner: XmlElement, context: Context) -> Controller | None:

@@ -10,32 +10,9 @@ from msgspec.structs import replace
 
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.world.scenario import position as places
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.position import (
-    Clothoid,
-    ClothoidSpline,
-    ClothoidSplineSegment,
-    FromCurrentEntity,
-    FromLaneCoordinates,
-    FromRoadCoordinates,
-    GeoPosition,
-    LanePosition,
-    Nurbs,
-    Orientation,
-    Polyline,
-    Position,
-    RelativeLanePosition,
-    RelativeObjectPosition,
-    RelativeRoadPosition,
-    RelativeWorldPosition,
-    RoadPosition,
-    Route,
-    RoutePosition,
-    Shape,
-    Trajectory,
-    TrajectoryPosition,
-    WorldPosition,
-)
+from xosc_lateral.world.scenario.position import Position, Route, Shape, Trajectory
 
 
 def read_position(owner: XmlElement, context: Context) -> Position:
@@ -69,34 +46,18 @@ def _shape(owner: XmlElement, context: Context) -> Shape:
     return mirrored_shape(shape) if context.left_handed else shape
 
 
-def _road(e: XmlElement, context: Context) -> RoadPosition:
-    return read_struct(RoadPosition, e, context, road_id=_road_id(e))
-
-
-def _lane(e: XmlElement, context: Context) -> LanePosition:
-    return read_struct(LanePosition, e, context, road_id=_road_id(e))
-
-
-def _road_id(e: XmlElement) -> str:
-    """Road ids are text; one that came out of an expression or a number parameter gets its plain form back."""
-    text = e.text("roadId")
-    if text.endswith(".0000000000") and text[:-11].lstrip("-").isdigit():
-        return text[:-11]
-    return text
-
-
-def _relative_lane(e: XmlElement, context: Context) -> RelativeLanePosition:
+def _relative_lane(e: XmlElement, context: Context) -> places.RelativeLanePosition:
     ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
     if ds is None and e.optional_number("dsLane") is None:
         ds = _number_or_zero(e, "ds", context)
     if lanes is None:
         context.remark(e, "dLane is missing: taken as 0, the same lane")
-    return read_struct(RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
+    return read_struct(places.RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
 
 
-def _relative_road(e: XmlElement, context: Context) -> RelativeRoadPosition:
+def _relative_road(e: XmlElement, context: Context) -> places.RelativeRoadPosition:
     ds, dt = (_number_or_zero(e, name, context) for name in ("ds", "dt"))
-    return read_struct(RelativeRoadPosition, e, context, ds=ds, dt=dt)
+    return read_struct(places.RelativeRoadPosition, e, context, ds=ds, dt=dt)
 
 
 def _number_or_zero(e: XmlElement, name: str, context: Context) -> float:
@@ -107,15 +68,15 @@ def _number_or_zero(e: XmlElement, name: str, context: Context) -> float:
     return value or 0.0
 
 
-def _route(e: XmlElement, context: Context) -> RoutePosition:
+def _route(e: XmlElement, context: Context) -> places.RoutePosition:
     reference, owner = e.child("RouteRef"), e.child("InRoutePosition")
     route = read_route(reference, context) if reference is not None else None
     content = owner.child() if owner is not None else None
     place = _in_route(content, context) if content else None
-    return read_struct(RoutePosition, e, context, route=route, in_route=place)
+    return read_struct(places.RoutePosition, e, context, route=route, in_route=place)
 
 
-_IN_ROUTE = declared(FromCurrentEntity, FromRoadCoordinates, FromLaneCoordinates)
+_IN_ROUTE = declared(places.FromCurrentEntity, places.FromRoadCoordinates, places.FromLaneCoordinates)
 
 
 def _in_route(e: XmlElement, context: Context) -> Any:
@@ -125,17 +86,16 @@ def _in_route(e: XmlElement, context: Context) -> Any:
     return None if reader is None else reader(e, context)
 
 
-def _geo(e: XmlElement, context: Context) -> GeoPosition:
+def _geo(e: XmlElement, context: Context) -> places.GeoPosition:
     latitude, longitude = e.optional_number("latitude"), e.optional_number("longitude")
     if latitude is None or longitude is None:
         latitude, longitude = math.radians(e.number("latitudeDeg")), math.radians(e.number("longitudeDeg"))
-    return read_struct(GeoPosition, e, context, latitude=latitude, longitude=longitude)
+    return read_struct(places.GeoPosition, e, context, latitude=latitude, longitude=longitude)
 
 
 _POSITIONS: dict[str, Reader] = {
-    **declared(WorldPosition, RelativeWorldPosition, RelativeObjectPosition, TrajectoryPosition),
-    "RoadPosition": _road,
-    "LanePosition": _lane,
+    **declared(places.WorldPosition, places.RelativeWorldPosition, places.RelativeObjectPosition),
+    **declared(places.RoadPosition, places.LanePosition, places.TrajectoryPosition),
     "RelativeLanePosition": _relative_lane,
     "RelativeRoadPosition": _relative_road,
     "RoutePosition": _route,
@@ -143,11 +103,11 @@ _POSITIONS: dict[str, Reader] = {
 }
 
 
-def _nurbs(e: XmlElement, context: Context) -> Nurbs:
-    return read_struct(Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
+def _nurbs(e: XmlElement, context: Context) -> places.Nurbs:
+    return read_struct(places.Nurbs, e, context, knots=tuple(knot.number("value") for knot in e.children("Knot")))
 
 
-_SHAPES: dict[str, Reader] = {**declared(Clothoid, Polyline, ClothoidSpline), "Nurbs": _nurbs}
+_SHAPES: dict[str, Reader] = {**declared(places.Clothoid, places.Polyline, places.ClothoidSpline), "Nurbs": _nurbs}
 
 READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: read_route, Trajectory: read_trajectory}
 
@@ -160,15 +120,15 @@ READERS: dict[object, Reader] = {Position: read_position, Shape: _shape, Route: 
 S = TypeVar("S", bound=Struct)
 
 _SIDEWAYS: dict[type[Struct], tuple[str, ...]] = {
-    WorldPosition: ("y", "h", "p"),
-    RelativeWorldPosition: ("dy",),
-    RoadPosition: ("t",),
-    TrajectoryPosition: ("t",),
-    RelativeRoadPosition: ("dt",),
-    RelativeLanePosition: ("offset",),
-    Orientation: ("h", "p"),
-    Clothoid: ("curvature", "curvature_prime"),
-    ClothoidSplineSegment: ("curvature_start", "curvature_end", "h_offset"),
+    places.WorldPosition: ("y", "h", "p"),
+    places.RelativeWorldPosition: ("dy",),
+    places.RoadPosition: ("t",),
+    places.TrajectoryPosition: ("t",),
+    places.RelativeRoadPosition: ("dt",),
+    places.RelativeLanePosition: ("offset",),
+    places.Orientation: ("h", "p"),
+    places.Clothoid: ("curvature", "curvature_prime"),
+    places.ClothoidSplineSegment: ("curvature_start", "curvature_end", "h_offset"),
 }
 """What changes its sign."""
 
@@ -177,21 +137,21 @@ def mirrored(position: Position) -> Position:
     """A position as written for CARLA, in right-handed coordinates; routes and trajectories in it already are."""
     if isinstance(position, Unsupported):
         return position
-    if isinstance(position, RelativeObjectPosition):
+    if isinstance(position, places.RelativeObjectPosition):
         along = position.dx, position.dy, position.dz
-        position = RelativeWorldPosition(position.entity_ref, *along, position.orientation, place=position.place)
-    if isinstance(position, LanePosition) and position.lane_id < 0:
+        position = places.RelativeWorldPosition(position.entity_ref, *along, position.orientation, place=position.place)
+    if isinstance(position, places.LanePosition) and position.lane_id < 0:
         # To the right of the lane's own direction: the road's +t for lanes that go against it.
         position = replace(position, offset=-position.offset)
     position = _negated(position)
-    if isinstance(position, WorldPosition) or position.orientation is None:
+    if isinstance(position, places.WorldPosition) or position.orientation is None:
         return position
     return replace(position, orientation=_negated(position.orientation))
 
 
 def mirrored_shape(shape: Shape) -> Shape:
     """A trajectory's shape, whose positions are mirrored already: its curvatures."""
-    if isinstance(shape, ClothoidSpline):
+    if isinstance(shape, places.ClothoidSpline):
         return replace(shape, segments=tuple(map(_negated, shape.segments)))
     return _negated(shape)
 

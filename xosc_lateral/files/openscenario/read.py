@@ -92,27 +92,13 @@ def read_scenario(
 ) -> Scenario:
     """Read a scenario with all that it takes from catalogs.
 
+    - `parameters`: override those that the file declares; `data`: its content, where nothing is at the path as yet
+    - `allowed`: folders, besides those around the scenario, that roads and catalogs may lie in; `roads`: where else its
+      road may lie
+    - `strict`: refuse a scenario whose vehicle catalog is missing, instead of playing a usual car and remarking it
+
     Raises `FormatError`: File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an
     unknown entity, catalog or parameter, a reference that leads outside, a missing road file.
-
-    Parameters
-    ----------
-    path : path
-        The ``.xosc`` file.
-    parameters : mapping of str to str, optional
-        Values that override those of the file's parameter declarations.
-    allowed : iterable of path
-        Folders, besides the scenario's own and the two above it, that roads and catalogs may lie in.
-    strict : bool
-        Refuse a scenario whose vehicle catalog is missing, instead of playing a usual car and remarking it.
-    roads : RoadSearch
-        Where else its road may lie.
-    data : bytes, optional
-        Its content, where nothing is written to the path as yet.
-
-    Returns
-    -------
-    Scenario
     """
     path = Path(path)
     document = read_document(path) if data is None else document_of(data, path)

@@ -15,9 +15,8 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr, unescape
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError, did_you_mean
-from xosc_lateral.base.plugins import plugins
-from xosc_lateral.base.shipped import shipped_folder
-from xosc_lateral.files.templates.parameter import Declared, Settings
+from xosc_lateral.base.plugins import plugins, shipped_folder
+from xosc_lateral.files.templates.parameter import Settings, Word
 from xosc_lateral.files.templates.plots import TEMPLATES
 from xosc_lateral.files.templates.template import Template
 
@@ -51,10 +50,10 @@ class PlainTemplate:
         return "" if header is None else header.get("description", "")
 
     @property
-    def parameters(self) -> tuple[Declared, ...]:
+    def parameters(self) -> tuple[Word, ...]:
         """What the scenario declares."""
         return tuple(
-            Declared(one.get("name", ""), one.get("value", ""), one.get("parameterType", "string"))
+            Word(one.get("name", ""), one.get("value", ""), kind=one.get("parameterType", "string"))
             for one in self._root.iterfind("ParameterDeclarations/ParameterDeclaration")
         )
 

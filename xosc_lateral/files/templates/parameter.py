@@ -21,7 +21,6 @@ class Number:
     high: float
     unit: str  # ``-`` for none
     what: str  # one line for the user
-    whole: bool = False  # whole numbers only
 
     def read(self, text: str) -> float:
         """Value of ``--set NAME=text``; `XoscLateralError` when it is not a number or out of range."""
@@ -31,8 +30,6 @@ class Number:
             raise XoscLateralError(f"{self.name}: {text!r} is not a number ({self.allowed})") from None
         if not (math.isfinite(value) and self.low <= value <= self.high):
             raise XoscLateralError(f"{self.name}: {text} is out of range ({self.allowed})")
-        if self.whole and value != round(value):
-            raise XoscLateralError(f"{self.name}: {text} is not a whole number ({self.allowed})")
         return value
 
     @property
@@ -53,48 +50,20 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
-    """One of a few words."""
+class Word:
+    """One of a few words, or a value of a type, as a plain scenario declares it."""
 
     name: str
     default: str
-    options: tuple[str, ...]
-    what: str  # one line for the user
+    options: tuple[str, ...] = ()
+    what: str = "Parameter of the scenario."  # one line for the user
+    kind: str = ""  # OpenSCENARIO's parameter type
     unit: str = "-"
 
     def read(self, text: str) -> str:
-        """Value of ``--set NAME=text``; `XoscLateralError` when it is none of the options."""
-        if text not in self.options:
+        """Value of ``--set NAME=text``; `XoscLateralError` when it is none of the options, or not of the type."""
+        if self.options and text not in self.options:
             raise XoscLateralError(f"{self.name}: {text!r} is none of {self.allowed}")
-        return text
-
-    @property
-    def allowed(self) -> str:
-        """Options in words."""
-        return ", ".join(self.options)
-
-    @property
-    def shown_default(self) -> str:
-        """Default as text."""
-        return self.default
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
-        return {"name": self.name, "default": self.default, "what": self.what, "options": list(self.options)}
-
-
-@dataclass(frozen=True, slots=True)
-class Declared:
-    """A parameter that a plain scenario declares."""
-
-    name: str
-    default: str
-    kind: str  # OpenSCENARIO's parameter type
-    what: str = "Parameter of the scenario."
-    unit: str = "-"
-
-    def read(self, text: str) -> str:
-        """Value of ``--set NAME=text``; `XoscLateralError` when it is not of the type."""
         if self.kind in _TYPES and not _TYPES[self.kind].fullmatch(text):
             raise XoscLateralError(f"{self.name}: {text!r} is no {self.kind}")
         return text
@@ -102,7 +71,7 @@ class Declared:
     @property
     def allowed(self) -> str:
         """What it may be, in words."""
-        return self.kind
+        return ", ".join(self.options) or self.kind
 
     @property
     def shown_default(self) -> str:
@@ -111,10 +80,11 @@ class Declared:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {"name": self.name, "default": self.default, "what": self.what, "type": self.kind}
+        known = {"name": self.name, "default": self.default, "what": self.what}
+        return known | ({"options": list(self.options)} if self.options else {"type": self.kind})
 
 
-Parameter = Number | Choice | Declared
+Parameter = Number | Word
 
 _INTEGER_PATTERNS, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
 
@@ -152,9 +122,9 @@ class Settings:
         return float(value)
 
     def text(self, name: str) -> str:
-        """Value of a `Choice`."""
+        """Value of a `Word`."""
         value = self._values[name]
-        assert isinstance(value, str), f"{name} is no choice"
+        assert isinstance(value, str), f"{name} is no word"
         return value
 
     def need_more(self, name: str, other: str) -> None:

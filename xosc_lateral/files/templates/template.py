@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any
 
-from xosc_lateral.base.shipped import shipped_folder
-from xosc_lateral.files.templates.parameter import Choice, Number, Parameter, Settings
+from xosc_lateral.base.plugins import shipped_folder
+from xosc_lateral.files.templates.parameter import Number, Parameter, Settings, Word
 
 COMMON_SETTINGS: tuple[Parameter, ...] = (
-    Choice("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),
-    Choice("version", "1.2", ("1.2", "1.3"), "Version of OpenSCENARIO that is written."),
+    Word("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),
+    Word("version", "1.2", ("1.2", "1.3"), "Version of OpenSCENARIO that is written."),
     Number("lane_width", 3.75, 3.25, 4.25, "m", "Width of a driving lane."),
     Number("wind_speed", 3.0, 0.0, 30.0, "m/s", "Mean speed of the wind."),
     Number("wind_direction", 90.0, 0.0, 360.0, "deg", "Where it blows to at the road's start: 90 left, 270 right."),
@@ -179,11 +179,6 @@ class Motorway:
     def length(self) -> float:
         """[m]"""
         return sum(part.length for part in self.alignment)
-
-    def lane(self, index: int) -> int:
-        """OpenDRIVE id of a driving lane; 0 is the slow lane beside the hard shoulder."""
-        number = self.lanes - index
-        return number if self.left_hand else -number
 
     def to_xml(self, name: str) -> str:
         """The road as an OpenDRIVE document, the same bytes each time."""

@@ -7,11 +7,12 @@ import os
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.signals import deferring_signals
@@ -71,7 +72,6 @@ def convert_many(
     *,
     workers: int = 1,
     cluster: str | None = None,
-    again: bool = False,
     keep_old: bool = False,
     converter: Converter | None = None,
     limits: JobLimits | None = None,
@@ -84,7 +84,7 @@ def convert_many(
 
     - `workers`: processes on this machine; -1: one per core; 0: this process itself, which a scenario can then take
       down; `cluster`: address of a dask.distributed scheduler, whose workers are used instead
-    - `again`: convert also what is up to date; `keep_old`: leave outputs whose inputs, settings or program have changed
+    - `keep_old`: leave outputs whose inputs, settings or program have changed
     - `converter`: in place of `convert_job`; has to be picklable; `limits`: what one job may take
     - `notify`: gets a line for what a user has to know besides the outcomes (a manifest that can't be read, say)
 
@@ -95,15 +95,15 @@ def convert_many(
         from xosc_lateral.workflows.batch.convert_job import convert_job
 
         converter = convert_job
-    run = _Run(batch, partial(_run_job, converter, limits or JobLimits()), workers, cluster, again, keep_old)
+    work = partial(_run_job, converter, limits or JobLimits())
     new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
     try:
         try:
-            yield from run.outcomes(notify or (lambda line: None))
+            yield from _outcomes(batch, work, workers, cluster, keep_old, notify or (lambda line: None))
         except OSError as error:
-            if error.errno not in (errno.EROFS, errno.EACCES) or again:
+            if error.errno not in (errno.EROFS, errno.EACCES):
                 raise
-            done = list(run.up_to_date())
+            done = list(_up_to_date(batch))
             if len(done) < len(batch):
                 raise
             yield from done
@@ -111,67 +111,58 @@ def convert_many(
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
     finally:
-        _remove_empty([run.state, *new])
+        _remove_empty([batch.folder / STATE, *new])
 
 
-@dataclass(frozen=True, slots=True)
-class _Run:
-    """A batch, what makes a job of it, and how."""
+def _outcomes(
+    batch: Batch,
+    work: Callable[[str, Job], _Reply],
+    workers: int,
+    cluster: str | None,
+    keep_old: bool,
+    notify: Callable[[str], None],
+) -> Iterator[JobOutcome]:
+    state = batch.folder / STATE
+    with folder_lock(state / "lock") as runs, ExitStack() as stack:
+        stack.callback(_sweep, batch.folder, runs[:1])
+        _sweep(batch.folder, runs[1:])
+        journal = stack.enter_context(Journal(batch.folder, state / "journal.jsonl", notify))
+        todo: dict[str, tuple[Job, str]] = {}
+        failed: set[Path] = set()
+        for job in batch.jobs:
+            former, timing = journal.row(job.name), journal.timing(job.name)
+            why = _why_anew(job, former, timing.state)
+            if former is None or (why and not (keep_old and why in CHANGES)):
+                todo[job.name] = job, why
+                continue
+            row = replace(former, error="", stale=bool(why))
+            if row != former:
+                journal.add(row, timing)
+            yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
+        if todo:
+            with deferring_signals(), open_pool(min(workers, len(todo)), cluster) as pool:
+                for job, reply in run_tasks(pool, partial(work, runs[0]), (job for job, _ in todo.values())):
+                    outcome = _noted(job, reply, journal, todo[job.name][1])
+                    failed |= {job.output.parent} if outcome.row.error else set()
+                    yield outcome
+        planned = {job.name for job in batch.jobs}
+        for output in journal:  # rows of former runs stay as long as their output does
+            if output not in planned and not (batch.folder / output).is_file():
+                journal.forget(output)
+        with files_of_run(runs[0]):
+            journal.finish()
+        _remove_empty(
+            place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+        )
 
-    batch: Batch
-    work: Callable[[str, Job], _Reply]
-    workers: int
-    cluster: str | None
-    again: bool
-    keep_old: bool
 
-    @property
-    def state(self) -> Path:
-        return self.batch.folder / STATE
-
-    def outcomes(self, notify: Callable[[str], None]) -> Iterator[JobOutcome]:
-        batch = self.batch
-        with (
-            folder_lock(self.state / "lock") as runs,
-            _sweeping(batch.folder, runs),
-            Journal(batch.folder, self.state / "journal.jsonl", notify) as journal,
-        ):
-            todo: dict[str, tuple[Job, str]] = {}
-            failed: set[Path] = set()
-            for job in batch.jobs:
-                former = journal.row(job.name) if job.name in journal else None
-                why = _why_anew(job, former, "" if former is None else journal.timing(job.name).state)
-                if former is None or self.again or (why and not (self.keep_old and why in CHANGES)):
-                    todo[job.name] = job, why
-                    continue
-                row = replace(former, error="", stale=bool(why))
-                if row != former:
-                    journal.add(row, journal.timing(job.name))
-                yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
-            if todo:
-                with deferring_signals(), open_pool(min(self.workers, len(todo)), self.cluster) as pool:
-                    jobs = (job for job, _ in todo.values())
-                    for job, reply in run_tasks(pool, partial(self.work, runs[0]), jobs):
-                        outcome = _noted(job, reply, journal, todo[job.name][1])
-                        failed |= {job.output.parent} if outcome.row.error else set()
-                        yield outcome
-            planned = {job.name for job in batch.jobs}
-            for output in journal:  # rows of former runs stay as long as their output does
-                if output not in planned and not (batch.folder / output).is_file():
-                    journal.forget(output)
-            with files_of_run(runs[0]):
-                journal.finish()
-            _remove_empty(
-                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
-            )
-
-    def up_to_date(self) -> Iterator[JobOutcome]:
-        """Jobs with nothing to do, in a folder that can't be written."""
-        rows = {row.output: row for row in read_manifest(self.batch.folder / MANIFEST)}
-        for job in self.batch.jobs:
-            row = rows.get(job.name)
-            if row is not None and not row.error and not row.stale and not _why_anew(job, row, ""):
-                yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
+def _up_to_date(batch: Batch) -> Iterator[JobOutcome]:
+    """Jobs with nothing to do, in a folder that can't be written."""
+    rows = {row.output: row for row in read_manifest(batch.folder / MANIFEST)}
+    for job in batch.jobs:
+        row = rows.get(job.name)
+        if row is not None and not row.error and not row.stale and not _why_anew(job, row, ""):
+            yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
 
 
 def _remove_empty(folders: Iterable[Path]) -> None:
@@ -181,15 +172,12 @@ def _remove_empty(folders: Iterable[Path]) -> None:
             folder.rmdir()
 
 
-@dataclass(frozen=True, slots=True)
-class _Reply:
-    """What comes back from a worker."""
+class _Reply(NamedTuple):
+    """What comes back from a worker; `stop`: why no other job can be done."""
 
     row: ManifestRow
-    seconds: float
+    timing: Timing = Timing()
     stop: str = ""
-    state: str = ""
-    """`file_state` of the output."""
 
 
 def _run_job(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Reply:
@@ -197,7 +185,7 @@ def _run_job(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Re
     start = time.perf_counter()
     if job.package_version != __version__:  # a worker of a cluster that came later
         what = f"a worker has version {__version__}, the run was planned by {job.package_version}"
-        return _Reply(job.row(what), 0.0, what)
+        return _Reply(job.row(what), stop=what)
     try:
         with files_of_run(run):
             row = job.row(job.error) if job.error else within_limits(converter, job, limits)
@@ -205,28 +193,27 @@ def _run_job(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Re
         row = job.row(f"{job.source}: {error}")
     except (XoscLateralError, OSError) as error:
         if isinstance(error, OSError) and error.errno in _STOPPING:
-            return _Reply(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
+            return _Reply(job.row(str(error)), stop=f"{job.output}: {error.strerror or error}")
         row = job.row(" ".join(str(error).split()))
     except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
         place = traceback.extract_tb(error.__traceback__)[-1]
         what = f"{type(error).__name__}: {' '.join(str(error).split())} ({Path(place.filename).name}:{place.lineno})"
         row = job.row(f"{job.source}: internal error: {what}")
     written = not row.error and job.page is None  # while a page is written, much can happen to an output
-    return _Reply(row, time.perf_counter() - start, state=file_state(job.output) if written else "")
+    return _Reply(row, Timing(time.perf_counter() - start, file_state(job.output) if written else ""))
 
 
 def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str) -> JobOutcome:
     if isinstance(reply, WorkerDiedError):
-        reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
+        reply = _Reply(job.row(f"{job.source}: {reply}"))
     if reply.stop:
         raise BatchStoppedError(f"{reply.stop}; {_GOES_ON}")
-    row = reply.row
-    if row.error and job.name in journal:  # what the output of a former run was made of, and why not now
-        former = journal.row(job.name)
-        if former.output_sha256 and _are({job.output: former.output_sha256}):
-            row = replace(former, error=row.error, stale=True)
-    journal.add(row, Timing(reply.seconds, reply.state))
-    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
+    row, timing, _ = reply
+    former = journal.row(job.name) if row.error else None
+    if former is not None and former.output_sha256 and _are({job.output: former.output_sha256}):
+        row = replace(former, error=row.error, stale=True)  # what the output is made of, and why it is not made now
+    journal.add(row, timing)
+    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, timing.seconds, why)
 
 
 def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
@@ -256,18 +243,9 @@ def _are(files: Mapping[Path, str]) -> bool:
         return False
 
 
-@contextmanager
-def _sweeping(folder: Path, runs: Sequence[str]) -> Iterator[None]:
-    """Remove what killed runs were just writing, and afterwards what killed workers of this one were; nobody else's."""
-
-    def sweep(runs: Sequence[str]) -> None:
-        names = temporary_files(runs)
-        for path in folder.rglob(".*.tmp*") if runs else ():
-            if names.fullmatch(path.name):
-                path.unlink(missing_ok=True)
-
-    try:
-        sweep(runs[1:])
-        yield
-    finally:
-        sweep(runs[:1])
+def _sweep(folder: Path, runs: Sequence[str]) -> None:
+    """Remove what killed runs, or killed workers of them, were just writing; nobody else's."""
+    names = temporary_files(runs)
+    for path in folder.rglob(".*.tmp*") if runs else ():
+        if names.fullmatch(path.name):
+            path.unlink(missing_ok=True)

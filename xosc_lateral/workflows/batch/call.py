@@ -6,7 +6,6 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -22,7 +21,7 @@ from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
-from xosc_lateral.workflows.batch.request import frame_requests
+from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
@@ -89,19 +88,28 @@ def convert_many(
     elif isinstance(scenarios, Sequence):
         inputs = list(scenarios)
     else:
-        inputs = list(frame_requests(scenarios, settings, variants=variants))
+        inputs = list(read_request_table(scenarios, settings, variants=variants))
     batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
     if not len(batch):
         raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
     _refuse_unknown_names(batch)
     # A folder in an output's place is that output's failure alone.
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
-    limits = JobLimits(job_timeout, job_memory)
     outcomes = outcomes_of(
-        batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
+        batch,
+        workers=workers,
+        cluster=cluster,
+        keep_old=keep_old,
+        limits=JobLimits(job_timeout, job_memory),
+        notify=None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True),
     )
+
+    def report_row(outcome: JobOutcome) -> None:
+        if on_outcome is not None:
+            on_outcome(_row(outcome.state, outcome.seconds, outcome.row))
+
     try:
-        summary = follow(outcomes, len(batch), Display(show), report=on_outcome and partial(_report_row, on_outcome))
+        summary = follow(outcomes, len(batch), Display(show), report=report_row)
     except Interrupted as signal:
         signal.finished = sum(job.output.is_file() for job in batch.jobs)
         raise
@@ -126,16 +134,8 @@ def _refuse_unknown_names(batch: Batch) -> None:
             raise FormatError(f"--{option} {name!r}: no scenario has such an entity", path=batch.base)
 
 
-def _report_row(report: Callable[[Mapping[str, Any]], None], outcome: JobOutcome) -> None:
-    report(_row(outcome.state, outcome.seconds, outcome.row))
-
-
 def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
     return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
-
-
-def _notifier(show: str) -> Callable[[str], None] | None:
-    return None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True)
 
 
 class BatchResult(Result):

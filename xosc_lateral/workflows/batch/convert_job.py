@@ -31,7 +31,11 @@ def convert_job(job: Job) -> ManifestRow:
     conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
     _refuse_changes(job)
     if job.page is not None:
-        write_page_and_thumbnail(conversion, job.page)
+        from xosc_lateral.workflows.conversion.page import conversion_page
+        from xosc_lateral.workflows.playing.figures import thumbnail
+
+        write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # stands for it in the index
+        write_atomically(job.page, conversion_page(conversion))
     return describe(job, conversion)
 
 
@@ -86,15 +90,6 @@ def _rounded(value: float | np.floating) -> float:
 INDEX = "index.html"
 
 GAPS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
-
-
-def write_page_and_thumbnail(conversion: Conversion, page: Path) -> None:
-    """Write the page of one conversion of a batch, and the small picture that stands for it in the index."""
-    from xosc_lateral.workflows.conversion.page import conversion_page
-    from xosc_lateral.workflows.playing.figures import thumbnail
-
-    write_atomically(page.with_suffix(".svg"), thumbnail(conversion.movement))
-    write_atomically(page, conversion_page(conversion))
 
 
 def write_batch_index(batch: Batch, folder: Path) -> Path:

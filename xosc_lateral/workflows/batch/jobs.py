@@ -104,7 +104,8 @@ def plan_batch(
         if isinstance(name, str) and name != AUTO:
             file_hash(find_profile(name, settings.library))  # wrong for all is said once, wrong in a table's row there
     root = _normal(Path(folder))
-    requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, root)]
+    listed = ([it] if isinstance(it, Request) else find_requests(it, settings, variants, root) for it in inputs)
+    requests = [_absolute(request) for part in listed for request in part]
     base = _common_folder(requests)
     fingerprints = _Fingerprints()
     jobs: dict[str, Job] = {}
@@ -140,16 +141,6 @@ def plan_batch(
     libraries = dict.fromkeys(request.settings.library for request in requests if request.settings.uses_auto)
     notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
     return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
-
-
-def _all_requests(
-    inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, root: Path
-) -> Iterator[Request]:
-    for item in inputs:
-        if isinstance(item, Request):
-            yield item
-        else:
-            yield from find_requests([item], settings, variants=variants, leave_out=root)
 
 
 def _absolute(request: Request) -> Request:

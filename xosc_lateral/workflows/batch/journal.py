@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
@@ -148,30 +147,27 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         with suppress(OSError):  # every row has been flushed; what a full disk refused was never promised
             self._file.close()
-        if not self._begin and error is not None:  # nothing was done
+        if not self._begin and raised[1] is not None:  # nothing was done
             self._path.unlink(missing_ok=True)
-
-    def __contains__(self, output: str) -> bool:
-        return output in self._begin
 
     def __iter__(self) -> Iterator[str]:
         return iter(tuple(self._begin))
 
-    def row(self, output: str) -> ManifestRow:
-        """The newest row of an output; `KeyError` if there is none."""
+    def row(self, output: str) -> ManifestRow | None:
+        """The newest row of an output."""
         import msgspec
 
+        if output not in self._begin:
+            return None
         self._file.seek(self._begin[output])
         return msgspec.convert(json.loads(self._file.readline())["row"], ManifestRow)  # was checked when it came in
 
     def timing(self, output: str) -> Timing:
         """Of the newest conversion of an output."""
-        return self._timings[output]
+        return self._timings.get(output, Timing())
 
     def add(self, row: ManifestRow, timing: Timing) -> None:
         """Append a row. From the return on it survives the death of this process.
@@ -200,7 +196,7 @@ class Journal:
         if self._changed:
             outputs, now = sorted(self._begin), time.time_ns()
             write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)
-            write_manifest((self.row(output) for output in outputs), self._folder / MANIFEST)
+            write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
         self._file.close()
         self._path.unlink()
 

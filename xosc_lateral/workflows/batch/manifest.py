@@ -91,9 +91,10 @@ class ManifestRow:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        values = {name: getattr(self, name) for name in self.__slots__}
-        values |= {name: dict(values[name]) for name in _MAPPINGS}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+        import msgspec
+
+        values: dict[str, Any] = msgspec.to_builtins(self)
+        return values
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:

@@ -137,7 +137,14 @@ def follow(
     stream = stream or sys.stderr
     summary = Summary(total)
     start = time.monotonic()
-    with _shower(display, summary, stream) as show:
+    shower: AbstractContextManager[Show] = nullcontext(lambda outcome: None)
+    if display is Display.JSON:
+        shower = _json_lines(summary, stream)
+    elif display is Display.AUTO and stream.isatty():
+        shower = _bar(summary, stream)
+    elif display is not Display.NOTHING:
+        shower = nullcontext(_lines(summary, stream, LINES_EVERY if display is Display.AUTO else math.inf))
+    with shower as show:
         for outcome in outcomes:
             summary.seconds = time.monotonic() - start
             summary.count(outcome)
@@ -155,16 +162,6 @@ def _counted(reasons: Mapping[str, int], what: str) -> str:
 
 
 Show = Callable[[JobOutcome], None]
-
-
-def _shower(display: Display, summary: Summary, stream: TextIO) -> AbstractContextManager[Show]:
-    if display is Display.JSON:
-        return _json_lines(summary, stream)
-    if display is Display.NOTHING:
-        return nullcontext(lambda outcome: None)
-    if display is Display.AUTO and stream.isatty():
-        return _bar(summary, stream)
-    return nullcontext(_lines(summary, stream, LINES_EVERY if display is Display.AUTO else math.inf))
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import islice
@@ -127,55 +127,44 @@ def concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, 
     yield scenario, "", settings, " ".join(why.split())
 
 
-def find_requests(
-    inputs: Sequence[str | Path], settings: ConvertSettings, *, variants: int = 1, leave_out: Path | None = None
-) -> Iterator[Request]:
-    """Scenarios that files, folders, globs and tables name.
+def find_requests(text: str | Path, settings: ConvertSettings, variants: int, leave_out: Path) -> Iterator[Request]:
+    """Scenarios that a file, a folder, a glob or a table names.
 
-    `inputs`: a ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table (CSV,
-    Parquet; see `read_request_table`); `settings`: for all of them; a table's columns go before it; `leave_out`: folder
-    that is not searched: the output's. Raises `FormatError`: an input that is not there, a glob that matches nothing, a
-    table that can't be read.
+    `text`: a ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table (CSV, Parquet;
+    see `read_request_table`), whose columns go before `settings`; `leave_out`: folder that is not searched: the
+    output's. Raises `FormatError`: an input that is not there, a glob that matches nothing, a table that can't be read.
     """
-    for text in inputs:
-        path = Path(text)
-        if path.is_dir():
-            scenarios = list(_search(path, leave_out))
-            if not scenarios:
-                raise FormatError(f"no {SCENARIO_SUFFIX} file in this folder or below", path=path)
-            yield from (Request(scenario, settings, variants, path, listed=False) for scenario in scenarios)
-        elif path.exists() and path.name.lower().endswith(TABLE_SUFFIXES):
-            yield from read_request_table(path, settings, variants=variants)
-        elif path.exists():
-            yield Request(path, settings, variants)  # a device or a fifo: its reader says so
-        elif _GLOB_CHARACTERS & set(str(text)):
-            base, scenarios = _matches(str(text), leave_out)
-            yield from (Request(scenario, settings, variants, base, listed=False) for scenario in scenarios)
-        else:
-            raise FormatError("no such file or folder", path=text)
+    path = Path(text)
+    if path.is_dir():
+        scenarios = list(_search(path, leave_out.resolve()))
+        if not scenarios:
+            raise FormatError(f"no {SCENARIO_SUFFIX} file in this folder or below", path=path)
+        yield from (Request(scenario, settings, variants, path, listed=False) for scenario in scenarios)
+    elif path.exists() and path.name.lower().endswith(TABLE_SUFFIXES):
+        yield from read_request_table(path, settings, variants=variants)
+    elif path.exists():
+        yield Request(path, settings, variants)  # a device or a fifo: its reader says so
+    elif _GLOB_CHARACTERS & set(str(text)):
+        base, scenarios = _matches(str(text), leave_out.resolve())
+        yield from (Request(scenario, settings, variants, base, listed=False) for scenario in scenarios)
+    else:
+        raise FormatError("no such file or folder", path=text)
 
 
-def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
-    """Scenarios of a table, one a row.
+def read_request_table(rows: Path | pd.DataFrame, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
+    """Scenarios of a table, one a row; paths are seen from its folder, those of a frame from the current one.
 
-    Columns: ``scenario`` (path, from the table's folder), and if wanted those of `COLUMNS` and `PREFIXES`: ``name`` of
-    the output in place of the scenario's, ``variants``, ``profile:ENTITY``, ``only`` and ``ego`` with entities
-    separated by semicolons (ego ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so
-    on; ``user:NAME`` is for the user. An empty cell leaves what `settings` says.
+    Columns: ``scenario`` (path), and if wanted those of `COLUMNS` and `PREFIXES`: ``name`` of the output in place of
+    the scenario's, ``variants``, ``profile:ENTITY``, ``only`` and ``ego`` with entities separated by semicolons (ego
+    ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so on; ``user:NAME`` is for the
+    user. An empty cell leaves what `settings` says.
 
     Raises `FormatError`: with the line of the table (the header is line 1).
     """
-    yield from _table_requests(read_text_table(path), settings, variants, path.parent, path)
-
-
-def frame_requests(frame: pd.DataFrame, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
-    """Scenarios of a frame with the columns of `read_request_table`; paths are as seen from the current folder."""
-    yield from _table_requests(as_text(frame), settings, variants, None, Path("DataFrame"))
-
-
-def _table_requests(
-    table: pd.DataFrame, settings: ConvertSettings, variants: int, base: Path | None, path: Path
-) -> Iterator[Request]:
+    if isinstance(rows, Path):
+        table, path, base = read_text_table(rows), rows, rows.parent
+    else:
+        table, path, base = as_text(rows), Path("DataFrame"), None
     if "scenario" not in table.columns:
         known = ", ".join(map(str, table.columns[:12]))
         raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
@@ -219,11 +208,10 @@ def is_single(text: str | Path) -> bool:
     return not path.is_dir() and not _GLOB_CHARACTERS & set(str(text))
 
 
-def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
-    """Scenario files below a folder, sorted; hidden folders, output trees of former batches and `leave_out` aside."""
+def _search(folder: Path, avoided: Path) -> Iterator[Path]:
+    """Scenario files below a folder, sorted; hidden folders, output trees of former batches and `avoided` aside."""
     from xosc_lateral.workflows.batch.manifest import MANIFEST  # one scenario needs none
 
-    avoided = None if leave_out is None else leave_out.resolve()
     for name, folders, files in os.walk(folder):
         here = Path(name)
         folders[:] = [inner for inner in sorted(folders) if not inner.startswith(".")
@@ -233,8 +221,8 @@ def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
                 yield here / file
 
 
-def _matches(pattern: str, leave_out: Path | None) -> tuple[Path, list[Path]]:
-    """Folder before the first wild part, and files that match, sorted; hidden ones and those in `leave_out` aside."""
+def _matches(pattern: str, avoided: Path) -> tuple[Path, list[Path]]:
+    """Folder before the first wild part, and files that match, sorted; hidden ones and those in `avoided` aside."""
     parts = Path(pattern).parts
     wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
     base = Path(*parts[:wild]) if wild else Path()
@@ -242,5 +230,4 @@ def _matches(pattern: str, leave_out: Path | None) -> tuple[Path, list[Path]]:
     shown = [path for path in matching if not any(part.startswith(".") for part in path.relative_to(base).parts)]
     if not shown:
         raise FormatError("nothing matches", path=pattern)
-    avoided = None if leave_out is None else leave_out.resolve()
     return base, [path for path in shown if path.is_file() and avoided not in path.resolve().parents]

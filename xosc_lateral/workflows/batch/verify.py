@@ -44,12 +44,16 @@ class Problem(StrEnum):
     DIFFERS = "differs"
 
 
+Defect = tuple[Problem, str]
+"""What is wrong with an output, and in words."""
+
+
 @dataclass(frozen=True, slots=True)
 class Checked:
     """An output, and what is wrong with it."""
 
     output: Path
-    problems: tuple[tuple[Problem, str], ...] = ()
+    problems: tuple[Defect, ...] = ()
 
 
 class Verification(Result):
@@ -154,40 +158,39 @@ def verify(
         There is no such file, or a folder has no manifest.
     """
     search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
-    tasks = [_Task(number, *task) for number, task in enumerate(_tasks(as_paths(outputs)))]
-    by_number: dict[int, Checked] = {}
+    tasks = list(enumerate(_tasks(as_paths(outputs))))
+    checked: dict[int, Checked] = {}
     with open_pool(min(workers, len(tasks)), None) as pool:
-        for task, checked in run_tasks(pool, partial(_checked, search, fast), tasks):
-            if isinstance(checked, WorkerDiedError):
-                checked = Checked(task.path, ((Problem.FAILED, str(checked)),))
-            by_number[task.number] = checked
+        for (number, task), defects in run_tasks(pool, partial(_defects, search, fast), tasks):
+            if isinstance(defects, WorkerDiedError):
+                defects = [(Problem.FAILED, str(defects))]
+            checked[number] = Checked(task.path, tuple(defects))
     done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
-    return Verification([by_number[task.number] for task in tasks], done)
+    return Verification([checked[number] for number, _ in tasks], done)
 
 
 class _Task(NamedTuple):
-    """An output to check: its place in the order, its path, its row of a manifest; or what is wrong with it already."""
+    """An output to check, and its row of a manifest; or what is wrong with it already."""
 
-    number: int
     path: Path
     row: ManifestRow | None = None
-    problem: tuple[Problem, str] | None = None
+    defect: Defect | None = None
 
 
-def _tasks(outputs: Sequence[Path]) -> Iterator[tuple[Any, ...]]:
+def _tasks(outputs: Sequence[Path]) -> Iterator[_Task]:
     for path in outputs:
         folder = path.parent if path.name == MANIFEST else path
         if not folder.is_dir():
             check_regular(path)
-            yield (path,)
+            yield _Task(path)
             continue
         named = {path_below(folder, row.output, "output"): row for row in _rows(folder)}
         for output, row in named.items():
-            yield output, row, None if output.exists() else (Problem.MISSING, "is gone")
+            yield _Task(output, row, None if output.exists() else (Problem.MISSING, "is gone"))
         for output in sorted(folder.rglob("*.xosc")):
             folders = output.parents[: len(output.relative_to(folder).parts) - 1]
             if output not in named and not any((inner / MANIFEST).exists() for inner in folders):
-                yield output, None, (Problem.FOREIGN, "is not in the manifest")
+                yield _Task(output, None, (Problem.FOREIGN, "is not in the manifest"))
 
 
 def _rows(folder: Path) -> Iterator[ManifestRow]:
@@ -197,26 +200,26 @@ def _rows(folder: Path) -> Iterator[ManifestRow]:
     return (row for row in read_manifest(folder / MANIFEST) if row.output_sha256)
 
 
-def _checked(search: ConvertSettings, fast: bool, task: _Task) -> Checked:
-    if task.problem is not None:
-        return Checked(task.path, (task.problem,))
+def _defects(search: ConvertSettings, fast: bool, numbered: tuple[int, _Task]) -> list[Defect]:
+    _, task = numbered
+    if task.defect is not None:
+        return [task.defect]
     try:
         return within_limits(partial(_check, search, fast), task, JobLimits())
     except (XoscLateralError, OSError) as error:
-        return Checked(task.path, ((Problem.FAILED, " ".join(str(error).split())),))
+        return [(Problem.FAILED, " ".join(str(error).split()))]
 
 
-def _check(search: ConvertSettings, fast: bool, task: _Task) -> Checked:
-    output, row = task.path, task.row
-    data = read_source(output).data
+def _check(search: ConvertSettings, fast: bool, task: _Task) -> list[Defect]:
+    data = read_source(task.path).data
     try:
-        origin = _Origin.of(output, data, search)
+        origin = _Origin.of(task.path, data, search)
     except FormatError as error:
-        return Checked(output, ((Problem.FOREIGN, error.what),))
-    problems = _changes(data, origin)
-    if row is not None and not problems and (others := list(_other_row(row, data, origin))):
-        problems.append((Problem.EDITED, f"the manifest states another {', '.join(others)}"))
-    return Checked(output, tuple(problems if problems or fast else _made_otherwise(output, data, origin)))
+        return [(Problem.FOREIGN, error.what)]
+    defects = _changes(data, origin)
+    if task.row is not None and not defects and (others := list(_other_row(task.row, data, origin))):
+        defects.append((Problem.EDITED, f"the manifest states another {', '.join(others)}"))
+    return defects if defects or fast else _made_otherwise(task.path, data, origin)
 
 
 def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
@@ -231,7 +234,7 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
         yield "inputs"
 
 
-def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
+def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     """How today's program makes it otherwise, from what its provenance states."""
     index = origin.variant - 1
     made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
@@ -251,9 +254,9 @@ def _version_of(facts: Mapping[str, Any]) -> bytes:
     return f'"package_version": {json.dumps(facts.get("package_version"))}'.encode()
 
 
-def _changes(data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
+def _changes(data: bytes, origin: _Origin) -> list[Defect]:
     """What was edited in an output, and what would come out otherwise today, and why."""
-    facts, problems = origin.facts, list[tuple[Problem, str]]()
+    facts, problems = origin.facts, list[Defect]()
     if facts.get(CONTENT) != content_hash(data):
         problems.append((Problem.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
@@ -265,21 +268,17 @@ def _changes(data: bytes, origin: _Origin) -> list[tuple[Problem, str]]:
                 problems.append((Problem.INPUT, f"{name} has changed"))
         except (OSError, FormatError, ValueError):
             problems.append((Problem.INPUT, f"{name} is gone"))
-    for name, sha256 in sorted({str(entity): profile for entity, profile in facts["profiles"].items()}.items()):
-        if (why := _other_profile(origin.settings, name, sha256)) is not None:
-            problems.append((Problem.PROFILE, why))
+    settings = origin.settings
+    for entity, recorded in sorted((str(entity), profile) for entity, profile in facts["profiles"].items()):
+        named = settings.entity.get(entity, settings.profile)
+        try:
+            profile = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
+        except (XoscLateralError, OSError) as error:
+            problems.append((Problem.PROFILE, f"profile of {entity!r}: {error}"))
+            continue
+        if not isinstance(recorded, list) or recorded[1:] != [profile_hash(profile)]:
+            problems.append((Problem.PROFILE, f"profile {profile.name!r} of {entity!r} has changed"))
     return problems
-
-
-def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str | None:
-    """Why an entity would get another profile today."""
-    named = settings.entity.get(entity, settings.profile)
-    try:
-        profile = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
-    except (XoscLateralError, OSError) as error:
-        return f"profile of {entity!r}: {error}"
-    same = isinstance(recorded, list) and recorded[1:] == [profile_hash(profile)]
-    return None if same else f"profile {profile.name!r} of {entity!r} has changed"
 
 
 @declare_options
@@ -342,7 +341,20 @@ def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers:
             yield Checked(old, ((Problem.FAILED, str(error)),))
             continue
         origins[row.output] = origin
-        jobs.append(_job(row, origin, path_below(new, row.output, "output")))
+        below, source = Path(row.scenario).parts, origin.scenario
+        base = source.parents[len(below) - 1] if source.parts[-len(below) :] == below else source.parent
+        jobs.append(
+            Job(
+                name=row.output,
+                scenario=source.relative_to(base).as_posix(),
+                source=source,
+                output=path_below(new, row.output, "output"),
+                base=base,
+                settings=origin.settings,
+                variant=origin.variant - 1,
+                fingerprint=fingerprint(origin.settings, origin.variant - 1),
+            )
+        )
     base = Path(os.path.commonpath([job.base for job in jobs])) if jobs else new
     batch = Batch(new, base, tuple(sorted(jobs, key=lambda job: job.name)))
     for outcome in convert_many(batch, workers=workers):
@@ -351,22 +363,6 @@ def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers:
             yield Checked(folder / name, ((Problem.FAILED, outcome.row.error),))
         else:
             yield _compared(folder / name, new / name, origins[name])
-
-
-def _job(row: ManifestRow, origin: _Origin, output: Path) -> Job:
-    below, variant = Path(row.scenario).parts, origin.variant - 1
-    source, depth = origin.scenario, len(below)
-    base = source.parents[depth - 1] if source.parts[-depth:] == below else source.parent
-    return Job(
-        name=row.output,
-        scenario=source.relative_to(base).as_posix(),
-        source=source,
-        output=output,
-        base=base,
-        settings=origin.settings,
-        variant=variant,
-        fingerprint=fingerprint(origin.settings, variant),
-    )
 
 
 def _compared(old: Path, new: Path, origin: _Origin) -> Checked:

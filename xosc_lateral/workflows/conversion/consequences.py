@@ -6,12 +6,11 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray
 from xosc_lateral.base.rows import blocks, slices_where
-from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
-from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
+from xosc_lateral.world.motion.segments import SegmentKind
 from xosc_lateral.world.road.network import RoadNetwork
 
 
@@ -27,19 +26,16 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> Iterator[Lane
             half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
             along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
             beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
-            left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
-            k = int(np.argmax(np.where(left, beyond, -np.inf)))
-            if left[k] and (worst is None or beyond[k] > worst.beyond):
+            outside = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
+            k = int(np.argmax(np.where(outside, beyond, -np.inf)))
+            if outside[k] and (worst is None or beyond[k] > worst.beyond):
                 worst = LaneDeparture(entity.name, float(motion.time[rows][k]), float(beyond[k]))
         if worst is not None:
             yield worst
 
 
 def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
-    """First and last row of lateral actions that keep to one lane: distances kept beside others, offsets in the lane.
-
-    Lane changes cross markings anyway.
-    """
+    """First and last row of lateral actions that keep to one lane; lane changes cross markings anyway."""
 
     def lateral(rows: slice) -> BoolArray:
         activity = motion.activity[rows]
@@ -54,10 +50,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
 
 
 def stay_as_written(enriched: Enriched, continuous: Collection[str]) -> tuple[str, ...]:
-    """Which lane changes and lane offsets stay as written although they are to be lifelike, a line each.
-
-    `continuous`: entities whose movement goes on through them.
-    """
+    """Lane changes that stay as written although they are to be lifelike; `continuous`: who moves on through them."""
     lines = []
     for entity in enriched.entities:
         spans = (span for span in entity.spans if span.kind is SegmentKind.LATERAL_ACTION)
@@ -73,37 +66,23 @@ def stay_as_written(enriched: Enriched, continuous: Collection[str]) -> tuple[st
 
 def validity_warnings(enriched: Enriched) -> tuple[str, ...]:
     """A line for each profile that moves vehicles at speeds or in lanes that it was not measured in."""
-    speeds: dict[str, list[FloatArray]] = {}
-    widths: dict[str, list[FloatArray]] = {}
-    profiles: dict[str, DriverProfile] = {}
-    for entity in enriched.entities:
-        if entity.profile is None or not entity.segments:
-            continue
-        name = entity.profile.name
-        profiles[name] = entity.profile
-        speed, width = _driven(entity, enriched.network)
-        speeds.setdefault(name, []).append(speed)
-        widths.setdefault(name, []).append(width)
+    network = enriched.network
+    speeds: dict[str, list[float]] = {}
+    widths: dict[str, list[float]] = {}
+    profiles = {one.profile.name: one.profile for one in enriched.entities if one.profile is not None and one.segments}
+    for entity in enriched.entities if profiles else ():
+        motion, name = entity.motion, "" if entity.profile is None else entity.profile.name
+        for span in (segment.span for segment in entity.segments):
+            speed, width = [], []
+            for rows in blocks(span.last + 1, span.first):
+                speed += [float(motion.speed[rows].min()), float(motion.speed[rows].max())]
+                # A lane that begins or ends is narrow for a moment.
+                width.append(float(np.median(network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows]))))
+            speeds.setdefault(name, []).extend((min(speed), max(speed)))
+            widths.setdefault(name, []).extend((min(width), max(width)))
     lines = []
     for name, profile in profiles.items():
-        outside = profile.validity.departures(np.concatenate(speeds[name]), np.concatenate(widths[name]))
+        outside = profile.validity.departures(np.array(speeds[name]), np.array(widths[name]))
         if outside:
             lines.append(f"profile {name} is used beyond what was measured: {'; '.join(outside)}")
     return tuple(lines)
-
-
-def _driven(entity: EntityResult, network: RoadNetwork) -> tuple[FloatArray, FloatArray]:
-    """Least and greatest speed [m/s] and lane width [m] where offsets were sampled."""
-    extremes = np.array([_extremes(entity.motion, segment.span, network) for segment in entity.segments])
-    return extremes[:, 0].ravel(), extremes[:, 1].ravel()
-
-
-def _extremes(
-    motion: EntityMotion, span: SegmentSpan, network: RoadNetwork
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    speed, width = [], []
-    for rows in blocks(span.last + 1, span.first):
-        speed += [float(motion.speed[rows].min()), float(motion.speed[rows].max())]
-        wide = np.median(network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows]))
-        width.append(float(wide))  # a lane that begins or ends is narrow for a moment
-    return (min(speed), max(speed)), (min(width), max(width))

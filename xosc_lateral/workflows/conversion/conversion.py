@@ -12,7 +12,7 @@ from msgspec import structs
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario
+from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 from xosc_lateral.world.motion.nominal import Activity
 
@@ -40,7 +40,7 @@ class Conversion(ConvertedScenario, Result):
                 lines.append(
                     f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
                     f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
-                    f"as {WRITTEN_AS.get(mode, mode)}"
+                    f"as {MODE_WORDS.get(mode, mode)}"
                 )
             else:
                 lines.append(f"  {entity.name}: as in the scenario ({entity.why})")

@@ -10,12 +10,13 @@ from typing import Unpack
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.rows import spilling_to
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded, read_output
+from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning, meaning_of
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
 from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
@@ -154,13 +155,15 @@ def check(plan: Plan, written: Written) -> Written:
         return written
     settings, source = plan.settings, plan.played.scenario
     meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
+    read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
+    allowed = (*settings.allow, *(path.parent for path in read_files))
 
     def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
         if chains is not written.chains:
-            trial = write_with(chains, plan, written.movement, written.vehicles)
+            trial = write_with(chains, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already.
-        output = read_output(trial.file.data, plan.output, source, allowed=settings.allow, roads=settings.roads)
+        output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = meaning.compare(output, written.vehicles.trajectories)
         return (trial, output, run), comparisons
 

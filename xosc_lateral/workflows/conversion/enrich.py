@@ -29,10 +29,17 @@ from xosc_lateral.workflows.conversion.result import (
     untouched,
 )
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
-from xosc_lateral.world.motion.crossings import Crossing, beside_written, crossings
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan, cut_segments, movement_runs
+from xosc_lateral.world.motion.segments import (
+    Crossing,
+    SegmentKind,
+    SegmentSpan,
+    beside_written,
+    crossings,
+    cut_segments,
+    movement_runs,
+)
 from xosc_lateral.world.motion.trajectory import (
     SETTLING_TIME,
     SampledDeviation,
@@ -65,23 +72,19 @@ def enrich(
 ) -> Enriched:
     """Enrich a played scenario.
 
-    - `drivers`: per entity a profile, or the reason why it is not enriched; as one that is absent
-    - `seed`, `variant`, `seed_words`: with the entity's name they seed its own random numbers: adding an entity changes
-      no other's offsets; `seed_words` holds further words of each entity
+    - `drivers`: per entity a profile, or the reason why it is not enriched
+    - `seed`, `variant`, `seed_words`: with an entity's name they seed its own random numbers: another one changes none
     - `context`: what the scenario doesn't state, or replaces: times [s] and values, the same for all entities
     - `trailers`: entity that is pulled -> its tractor, in whose track it follows
-    - `attempts`: sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the
-      best is kept
-    - `neighbours`: `borrow`: neighbours give way to each other by a population's law, too, where a profile's answer is
-      not known (`give_way`)
-    - `with_sensor`: add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is
-      added after drivers have given way and after what nobody could drive was smoothed
-    - `uncertain`: entities whose motion will be another one, since it depends on a vehicle under test or a controller:
-      nobody responds to where they nominally are, nor do they to others
+    - `attempts`: at most, while vehicles touch or leave their lane that nominally don't; the best is kept
+    - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
+    - `with_sensor`: add what the sensor added to the drives that each profile was fitted on: nobody drives that, so it
+      comes after drivers have given way and after what nobody could drive was smoothed
+    - `uncertain`: entities that will move otherwise, since they depend on a vehicle under test or a controller: nobody
+      responds to where they nominally are, nor do they to others
     - `heeds_controllers`: where a controller of the player steers, nothing is sampled
-    - `continuous`: entities whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the
-      others leads from the segment before to the one behind
-    - `lane_changes`: the way across of those lane changes and lane offsets
+    - `continuous`: whose movement goes on through lane changes and lane offsets (`movement_runs`), across as
+      `lane_changes` says; that of the others leads from the segment before to the one behind
     - `least_time`: for which each segment is sampled, should it last longer in another run [s]
 
     Raises `DriverProfileError`: the sensor is asked for and a profile knows of none.
@@ -140,14 +143,10 @@ class _Sample(NamedTuple):
     """Offsets sampled on one run of spans."""
 
     spans: tuple[SegmentSpan, ...]
-    knots: IntArray
-    """Rows of the motion that were sampled."""
-    offset: FloatArray
-    """There. [m]"""
-    error: FloatArray
-    """What a sensor adds; zeros unless asked for. [m]"""
-    beyond: FloatArray
-    """How it would go on after the end. [m]"""
+    knots: IntArray  # rows of the motion that were sampled
+    offset: FloatArray  # there [m]
+    error: FloatArray  # what a sensor adds; zeros unless asked for [m]
+    beyond: FloatArray  # how it would go on after the end [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,23 +264,18 @@ def _apart(
     drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork, uncertain: Collection[str]
 ) -> list[_Drawn]:
     """Neighbours give way to each other, where it is certain that they meet."""
-    if uncertain:
-        certain = [one for one in drawn if one.motion.name not in uncertain]
-        moved = {one.motion.name: one for one in _apart(certain, motion, network, ())}
-        return [moved.get(one.motion.name, one) for one in drawn]
-    if len(drawn) < 2 or not any(one.samples for one in drawn):
+    certain = [one for one in drawn if one.motion.name not in uncertain]
+    if len(certain) < 2 or not any(one.samples for one in certain):
         return list(drawn)
-    every = max(1, round(SAMPLE_STEP / motion.step))
-    rows = np.arange(0, len(motion.entities[0].time), every)
-    moves = give_way(motion, network, [_sampled(one, rows) for one in drawn], rows)
-    return [
-        one if move is None else replace(one, samples=tuple(_moved(sample, rows, move) for sample in one.samples))
-        for one, move in zip(drawn, moves, strict=True)
-    ]
-
-
-def _moved(sample: _Sample, rows: IntArray, move: FloatArray) -> _Sample:
-    return sample._replace(offset=stored(sample.offset + np.interp(sample.knots, rows, move)))
+    rows = np.arange(0, len(motion.entities[0].time), max(1, round(SAMPLE_STEP / motion.step)))
+    moves = give_way(motion, network, [_sampled(one, rows) for one in certain], rows)
+    moved = dict[str, _Drawn]()
+    for vehicle, move in zip(certain, moves, strict=True):
+        if move is not None:
+            aside = (stored(one.offset + np.interp(one.knots, rows, move)) for one in vehicle.samples)
+            samples = tuple(one._replace(offset=offset) for one, offset in zip(vehicle.samples, aside, strict=True))
+            moved[vehicle.motion.name] = replace(vehicle, samples=samples)
+    return [moved.get(one.motion.name, one) for one in drawn]
 
 
 def _sampled(vehicle: _Drawn, rows: IntArray) -> SampledVehicle:
@@ -292,9 +286,8 @@ def _sampled(vehicle: _Drawn, rows: IntArray) -> SampledVehicle:
         for sample in vehicle.samples:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
-    return SampledVehicle(
-        vehicle.motion, stored(deviation), stored(can_move), vehicle.seen.responds, vehicle.seen.alone
-    )
+    seen = vehicle.seen
+    return SampledVehicle(vehicle.motion, stored(deviation), stored(can_move), seen.responds, seen.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
@@ -302,12 +295,11 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     entity = drawn.motion
     if not drawn.samples:
         return untouched(entity, drawn.spans, drawn.why)
-    driven, bounds = zip(
-        *(drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples), strict=True
-    )
+    driven = [drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples]
     samples = tuple(
-        one._replace(offset=stored(offset + one.error)) for one, offset in zip(drawn.samples, driven, strict=True)
+        one._replace(offset=stored(offset + one.error)) for one, (offset, _) in zip(drawn.samples, driven, strict=True)
     )
+    bounds = [bound for _, bound in driven if bound is not None]
     deviation = replace(drawn, samples=samples).deviation()
     return EntityResult(
         entity,
@@ -318,7 +310,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         deviation,
         displace(entity, network, deviation),
         drawn.seen.neutral,
-        max(filter(None, bounds), key=lambda bound: bound.before.excess, default=None),
+        max(bounds, key=lambda bound: bound.before.excess, default=None),
         drawn.crossings,
     )
 

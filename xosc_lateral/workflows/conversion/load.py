@@ -64,18 +64,23 @@ def load_scenario(
     roads: RoadSearch = NO_ROADS,
     strict: bool = False,
 ) -> Loaded:
-    """Read a scenario and its road.
+    """Read a scenario and its road; once for all its variants if it depends on its file and its road's place alone.
 
-    - `path`: the ``.xosc`` file
-    - `parameters`: values that replace those declared
-    - `allowed`: folders, besides those around the scenario, that its road and catalogs may lie in
-    - `roads`: where else its road may lie
-    - `strict`: refuse a missing vehicle catalog, instead of playing a usual car
+    `parameters` replace those declared; its road and catalogs may lie in `allowed` folders besides those around it, its
+    road also where `roads` says; `strict`: a missing vehicle catalog is refused, instead of played as a usual car.
 
     Raises `FormatError`: with file, line and element.
     """
     values = tuple(sorted((parameters or {}).items()))
-    scenario = _read(path, values, tuple(allowed), roads, strict)
+    state = check_regular(path)
+    guard_input(path)
+    asked = (path, values, tuple(allowed), roads, strict)
+    reads = _read_once.cache_info().misses
+    scenario = _read_once(*asked, state_key(state))
+    is_fresh = _read_once.cache_info().misses > reads
+    stands_alone = not scenario.catalog_locations and not scenario.remarks
+    if not is_fresh and not (stands_alone and (scenario.road_file is None or scenario.road_file.is_file())):
+        scenario = _read(*asked)  # a result that was kept holds only where nothing else was read, or missed
     network, road = RoadNetwork(()), tuple[tuple[Path, str], ...]()
     if scenario.road_file is not None:
         network = road_network(scenario.road_file)
@@ -86,15 +91,6 @@ def load_scenario(
 def _read(
     path: Path, parameters: tuple[tuple[str, str], ...], allowed: tuple[Path, ...], roads: RoadSearch, strict: bool
 ) -> Scenario:
-    """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
-    state = check_regular(path)
-    guard_input(path)
-    reads = _read_once.cache_info().misses
-    scenario = _read_once(path, parameters, allowed, roads, strict, state_key(state))
-    is_fresh = _read_once.cache_info().misses > reads
-    stands_alone = not scenario.catalog_locations and not scenario.remarks
-    if is_fresh or (stands_alone and (scenario.road_file is None or scenario.road_file.is_file())):
-        return scenario
     return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
 
 
@@ -107,7 +103,7 @@ def _read_once(
     strict: bool,
     _state: tuple[int, ...],
 ) -> Scenario:
-    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
+    return _read(path, parameters, allowed, roads, strict)
 
 
 @lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work
@@ -127,10 +123,3 @@ def road_network(path: Path) -> RoadNetwork:
 @lru_cache(maxsize=32)
 def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)
-
-
-def read_output(data: bytes, output: Path, source: Scenario, *, allowed: Iterable[Path], roads: RoadSearch) -> Scenario:
-    """An output from its bytes, as seen from its place, with what its source was allowed to read."""
-    road = () if source.road_file is None else (source.road_file.parent,)
-    folders = (*allowed, *(path.parent for path in source.input_files), *road)
-    return read_scenario(output, allowed=folders, roads=roads, data=data)

@@ -1,7 +1,7 @@
-"""Whether a written scenario still means what its source does: both are played, under egos that drive in several ways.
+"""Whether a written scenario still means what its source does: both are played, the ego driving in several ways.
 
-Number, order and last lanes of events, contacts and the end stay; times do, but for what lateral actions take longer
-or shorter from beside the middle (`shifts`). Where they don't, the moves before the conflict become smaller.
+Events keep their number, order and last lanes, contacts and the end stay; times shift only by what lateral actions that
+take longer or shorter from beside the middle explain (`shifts`). Otherwise moves before the conflict become smaller.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain as chained
 from math import inf
 from typing import TypeVar
 
@@ -17,6 +16,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
@@ -73,8 +73,8 @@ LEAST_DURATION = 20.0
 """Of that run. [s]"""
 
 SIZES = (Size(), Size(limit=0.75), Size(limit=0.5), Size(0.5), Size(0.25), Size(0.0))
-"""Sizes that are tried for the moves before a conflict: a contact comes of the largest offsets alone. All of them are
-without a path, which makes a car's way a millimetre longer in 400 m."""
+"""Tried for the moves before a conflict, in order. All of them are without a path, which makes a car's way a millimetre
+longer in 400 m: the first is that alone. Limits come first, since a contact comes of the largest offsets alone."""
 LARGE_SHIFT = 0.3
 """Of its duration, by which an action lasts longer or shorter without a word. [-]"""
 MOST_TRIALS = 40
@@ -84,7 +84,6 @@ Output = TypeVar("Output")
 
 Sizes = dict[int, Size]
 """By the number of a chain, where it is driven otherwise than sampled."""
-
 
 Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
@@ -101,10 +100,7 @@ def _drives(speed: float) -> tuple[Speeds, ...]:
 
 
 class Meaning:
-    """What happens in a source, nominally and under other egos.
-
-    `played`: the source and its nominal run; `egos`: vehicles under test; `time_limit`: of playback. [s]
-    """
+    """What happens in a source, nominally and under other egos; `egos`: vehicles under test; `time_limit` [s]."""
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
         self._played, self._egos, self._step = played, egos, step
@@ -117,8 +113,9 @@ class Meaning:
 
     @property
     def end(self) -> float:
-        """Of the longest run under a faster or slower ego. [s]"""
-        return max(motion.end_time for _, motion in self._before[:3])
+        """Of the longest run, that under a braking ego aside. [s]"""
+        nominal_slower_faster = self._before[:3]
+        return max(motion.end_time for _, motion in nominal_slower_faster)
 
     def _runs(self, scenario: Scenario) -> Iterator[tuple[Scenario, NominalMotion]]:
         """Each run and what was played; all but the nominal one in coarser steps, until nothing is left to happen."""
@@ -135,39 +132,26 @@ class Meaning:
 
     def compare(self, scenario: Scenario, trajectories: Collection[str]) -> tuple[list[Comparison], NominalMotion]:
         """With an output in which some entities follow trajectories: each run with its own; the nominal run of it."""
-        from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
-
-        source, network = self._played.scenario, self._played.network
-        gone = {one.path for one in replaced_groups(source, trajectories)}
-        comparisons, after = [], list(self._runs(scenario))
-        for number, ((driven, before), (_, run)) in enumerate(zip(self._before, after, strict=True)):
+        network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
+        comparisons, after = [], [run for _, run in self._runs(scenario)]
+        for (driven, before), run in zip(self._before, after, strict=True):
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
-            own_end = number == 0 or not gone  # else stories that others wait for may be gone
+            ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            comparisons.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=own_end))
-        return comparisons, after[0][1]
+            comparisons.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends))
+        return comparisons, after[0]
 
 
 def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
     """A scenario that ends, at the latest, some time after all stories of its source are complete."""
     storyboard, stories = scenario.storyboard, source.storyboard.stories
     place, stop = storyboard.place, storyboard.stop_trigger
-    conditions = tuple(
-        Condition(
-            "over",
-            AFTER_ALL,
-            ConditionEdge.NONE,
-            StoryboardElementStateCondition(
-                StoryboardElementType.STORY, story.name, StoryboardElementState.COMPLETE, place=place
-            ),
-            None,
-            place,
-        )
-        for story in stories
-    )
     if not stories or stop is None:
         return scenario
-    trigger = structs.replace(stop, groups=(*stop.groups, ConditionGroup(conditions)))
+    kind, state = StoryboardElementType.STORY, StoryboardElementState.COMPLETE
+    contents = (StoryboardElementStateCondition(kind, story.name, state, place=place) for story in stories)
+    over = (Condition("over", AFTER_ALL, ConditionEdge.NONE, content, None, place) for content in contents)
+    trigger = structs.replace(stop, groups=(*stop.groups, ConditionGroup(tuple(over))))
     return replace(scenario, storyboard=structs.replace(storyboard, stop_trigger=trigger))
 
 
@@ -189,8 +173,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
                 dynamics = TransitionDynamics(DynamicsShape.LINEAR, DynamicsDimension.RATE, rate)
                 target = AbsoluteTargetSpeed(factor * float(entity.speed[0]))
                 action = Action(name, SpeedAction(target, dynamics, place=place), place, True)
-                trigger = at_time(moment, STORY, place)
-                events.append(Event(name, Priority.OVERRIDE, (action,), trigger, place))
+                events.append(Event(name, Priority.OVERRIDE, (action,), at_time(moment, STORY, place), place))
             name = f"{STORY} {entity.name}"
             actors = Actors((entity.name,), False, place)
             groups.append(ManeuverGroup(name, actors, (Maneuver(name, tuple(events), place),), place))
@@ -201,27 +184,24 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 
 @dataclass(frozen=True, slots=True)
 class KeptChains:
-    """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended.
-
-    `smaller`: entity -> least size of its moves, and whether all of its chains are smaller.
-    """
+    """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended."""
 
     chains: tuple[OffsetChain, ...]
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
-    smaller: dict[str, tuple[Size, bool]]
+    smaller: dict[str, tuple[Size, bool]]  # entity -> least size of its moves; whether all chains are smaller
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
         """The largest of each event."""
         return largest_of(self.comparisons)
 
-    def warnings(self, left: Collection[str]) -> Iterator[str]:
+    def warnings(self, unmoved: Collection[str]) -> Iterator[str]:
         """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
-        for name in sorted(left):
+        for name in sorted(unmoved):
             yield f"'{name}' stays as it is: {CHANGES}"
         for name, ((factor, limit), everywhere) in sorted(self.smaller.items()):
-            if name not in left:
+            if name not in unmoved:
                 size = "none" if factor == 0.0 else f"{factor:g} times what was sampled"
                 size = size if factor < 1.0 else f"at most {limit:g} times the largest that was sampled"
                 where = "" if everywhere else " before a maneuver"
@@ -242,10 +222,7 @@ def keep_meaning(
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetChain]], tuple[Output, list[Comparison]]],
 ) -> tuple[Output, KeptChains]:
-    """Chains as large as leave what happens as it was, and the output with them.
-
-    `motion`, without offsets, says which chain comes before a conflict; `attempt` writes with some chains and plays.
-    """
+    """Chains as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
     sizes: Sizes = {}
     trials = 1
 
@@ -320,32 +297,28 @@ def ending_at(scenario: Scenario, end: float) -> Scenario:
 
 
 def as_played(
-    enriched: Enriched, written: Scenario, run: NominalMotion, moved: Collection[str], left: Collection[str]
+    enriched: Enriched, written: Scenario, run: NominalMotion, moved: Collection[str], unmoved: Collection[str]
 ) -> Enriched:
     """What a reactive output does when it is played, in place of what was sampled.
 
     - `written`, `run`: the output and its nominal run, which may end earlier than the one that was sampled for
-    - `moved`, `left`: entities that keep their maneuvers: those with lane offsets, and those that stay as they are
+    - `moved`, `unmoved`: entities that keep their maneuvers: those with lane offsets, and those that stay as they are
     """
     motion = enriched.motion
     if run.end_time < motion.end_time - motion.step:
-        run = play(
-            ending_at(written, motion.end_time),
-            enriched.network,
-            step=motion.step,
-            time_limit=motion.end_time + motion.step,
-        )
+        later = ending_at(written, motion.end_time)
+        run = play(later, enriched.network, step=motion.step, time_limit=motion.end_time + motion.step)
     played = {entity.name: entity for entity in run.entities}
     entities = tuple(
         _measured(entity, played[entity.name])
         if entity.name in moved
         else untouched(entity.motion, entity.spans, CHANGES)
-        if entity.name in left
+        if entity.name in unmoved
         else entity
         for entity in enriched.entities
     )
     gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
-    departures = tuple(chained.from_iterable(lane_departures(entity, enriched.network) for entity in entities))
+    departures = tuple(departure for entity in entities for departure in lane_departures(entity, enriched.network))
     return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
 
 

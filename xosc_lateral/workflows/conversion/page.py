@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
-from xosc_lateral.workflows.conversion.result import WRITTEN_AS, ConvertedScenario, Enriched, EntityResult
+from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import COMFORTABLE
 from xosc_lateral.workflows.playing.page import add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, Gap, closest_following, road_path
+from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, closest_following, road_path
 
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
@@ -88,26 +88,19 @@ def conversion_page(conversion: ConvertedScenario) -> str:
 
 def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
     made = conversion.provenance
+    driven = {one: one.profile for one in conversion.movement.entities if one.is_enriched and one.profile is not None}
     return {
         "scenario": conversion.source.name,
         "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
-        "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
-        "neighbours": [
-            f"{one.name}: {one.beside(made.options['neighbours'])}"
-            for one in conversion.movement.entities
-            if one.is_enriched and one.profile is not None
-        ],
+        "written as": [f"{name}: {MODE_WORDS[mode]}" for name, mode in made.modes.items()],
+        "neighbours": [f"{one.name}: {one.beside(made.options['neighbours'])}" for one in driven],
         "seed": made.options["seed"],
         "variant": made.variant,
         "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
         "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
         "profiles are valid for": sorted(
-            {
-                f"{one.profile.name}: {one.profile.validity.in_words() or 'not stated'}"
-                for one in conversion.movement.entities
-                if one.is_enriched and one.profile is not None
-            }
+            {f"{profile.name}: {profile.validity.in_words() or 'not stated'}" for profile in driven.values()}
         ),
         "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
         "output hash": conversion.sha256,
@@ -195,15 +188,28 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
     after = {gap.names: gap for gap in enriched.gaps_after}
     pairs = [(before.get(names), after.get(names)) for names in sorted(before | after)]
     pairs.sort(key=lambda pair: min(gap.distance for gap in pair if gap is not None))
+    rows = [
+        {
+            "pair": next(" and ".join(gap.names) for gap in (nominal, made) if gap),
+            "nominal [m]": None if nominal is None else nominal.distance,
+            GAP_TIMES[0]: None if nominal is None else nominal.time,
+            "enriched [m]": None if made is None else made.distance,
+            GAP_TIMES[1]: None if made is None else made.time,
+            "change [m]": None if nominal is None or made is None else made.distance - nominal.distance,
+        }
+        for nominal, made in pairs
+    ]
     if not pairs:
         page.text("No two vehicles come that close to each other.")
     else:
         page.table(
-            [_gap_row(*pair) for pair in pairs],
+            rows,
             "Pairs of vehicles, the closest first. Marked: pairs that touch in the enriched scenario only.",
             formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f")
             | dict.fromkeys(GAP_TIMES, ".1f"),
-            tones=_tones(enriched, pairs),
+            tones={
+                k: "bad" for k, pair in enumerate(pairs) if any(gap in enriched.new_contacts for gap in pair if gap)
+            },
         )
     _add_followings(page, enriched)
 
@@ -218,7 +224,12 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
         for pair in sorted(before | after)
         if min(side[pair].headway if pair in side else math.inf for side in (before, after)) <= LONGEST_HEADWAY
     ]
-    rows = [_following_row(before.get(pair, Following(*pair)), after.get(pair, Following(*pair))) for pair in names]
+    rows = []
+    for pair in names:
+        nominal, made = before.get(pair, Following(*pair)), after.get(pair, Following(*pair))
+        values = (nominal.headway, made.headway, nominal.time_to_collision, made.time_to_collision)
+        shown = (value if math.isfinite(value) else None for value in values)
+        rows.append({"pair": " behind ".join(pair), **dict(zip(FOLLOWING_COLUMNS, shown, strict=True))})
     page.heading("Time headway and time to collision")
     page.table(
         rows[:MOST_FOLLOWINGS],
@@ -255,18 +266,6 @@ def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
         formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f")
         | {"lateral speed [m/s]": ".3f"},
     )
-
-
-def _following_row(before: Following, after: Following) -> dict[str, object]:
-    values = (before.headway, after.headway, before.time_to_collision, after.time_to_collision)
-    shown = (value if math.isfinite(value) else None for value in values)
-    return {"pair": f"{before.follower} behind {before.leader}", **dict(zip(FOLLOWING_COLUMNS, shown, strict=True))}
-
-
-def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -> dict[int, Tone]:
-    """Rows of pairs that touch only since they were enriched."""
-    touching = {gap.names for gap in enriched.new_contacts}
-    return {number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)}
 
 
 def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
@@ -311,18 +310,6 @@ def _entity_row(entity: EntityResult) -> dict[str, object]:
         "acc. max. [m/s²]": float(added.max()),
         f"> {COMFORTABLE} m/s² [%]": 100.0 * float(np.mean(added > COMFORTABLE)),
         "jerk rms [m/s³]": float(np.sqrt(np.mean(jerk**2))),
-    }
-
-
-def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
-    names = (before or after).names  # type: ignore[union-attr]
-    return {
-        "pair": " and ".join(names),
-        "nominal [m]": None if before is None else before.distance,
-        GAP_TIMES[0]: None if before is None else before.time,
-        "enriched [m]": None if after is None else after.distance,
-        GAP_TIMES[1]: None if after is None else after.time,
-        "change [m]": None if before is None or after is None else after.distance - before.distance,
     }
 
 

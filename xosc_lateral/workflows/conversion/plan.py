@@ -23,7 +23,7 @@ from xosc_lateral.workflows.conversion.load import Loaded, Played
 from xosc_lateral.workflows.conversion.meaning import meaning_of, play_until
 from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
-from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
@@ -83,13 +83,11 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class WrittenAs:
-    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are.
-
-    `frozen`: triggers that depend on a vehicle under test and no longer do in the output, a line each.
-    """
+    """Who follows a trajectory, and who keeps its maneuvers and may get lane offsets; all others stay as they are."""
 
     trajectories: frozenset[str]
     lane_offsets: frozenset[str]
+    # frozen: triggers that depend on a vehicle under test and no longer do in the output, a line each
     frozen: tuple[str, ...] = ()
 
 
@@ -132,7 +130,7 @@ def decide(
         version,
         inputs,
         played,
-        _extended_run(played, settings, depends, tuple(egos)),
+        _extended_by_trials(played, settings, depends, tuple(egos)),
         egos,
         controllers,
         depends,
@@ -143,8 +141,11 @@ def decide(
         _unwritable(played, settings, version, {*egos, *controllers}),
         LateralActions.of(scenario),
     )
-    if settings.lane_changes is LaneChanges.LIFELIKE:
-        _refuse_steps(scenario, continuous)
+    for at in scenario.storyboard.events() if settings.lane_changes is LaneChanges.LIFELIKE else ():
+        for content in (action.content for action in at.event.actions):
+            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
+            if is_step and set(at.actors) & continuous:
+                raise content.place.error("a step has no way across: take --lane-changes written")
     return plan
 
 
@@ -166,10 +167,7 @@ def _on_trajectories(
 
 
 def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]:
-    """Vehicles under test of a conversion, and why each is one.
-
-    Raises `FormatError`: if one of them was also to be enriched.
-    """
+    """Vehicles under test, and why each is one; `FormatError`: one of them was also to be enriched."""
     if settings.ego is not None and not settings.ego:
         return {}
     egos = vehicles_under_test(scenario)
@@ -191,7 +189,9 @@ def heeds_controllers(settings: ConvertSettings) -> bool:
     return settings.mode is not OutputMode.TRAJECTORY and (settings.ego is None or bool(settings.ego))
 
 
-def _extended_run(played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]) -> Played:
+def _extended_by_trials(
+    played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]
+) -> Played:
     """The run that offsets are for: a longer one where a vehicle under test decides when trajectories end."""
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if settings.mode is not OutputMode.AUTO or _is_replay(settings, depends) or not ends:
@@ -209,8 +209,8 @@ def _unwritable(
     """See `Plan`: of those alone that `only` leaves out; the others follow trajectories anyway."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
-    left = {*settings.only, *unforeseeable}
-    others = [entity.name for entity in played.motion.entities if entity.name not in left]
+    excluded = {*settings.only, *unforeseeable}
+    others = [entity.name for entity in played.motion.entities if entity.name not in excluded]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
     return motion_unknown_to(version, played.scenario, played.motion, others)
@@ -244,15 +244,6 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
         )
 
 
-def _refuse_steps(scenario: Scenario, names: Collection[str]) -> None:
-    """Raise `FormatError` where a lane change of these entities takes no time, but is to be lifelike."""
-    for at in scenario.storyboard.events():
-        for content in (action.content for action in at.event.actions):
-            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-            if is_step and set(at.actors) & set(names):
-                raise content.place.error("a step has no way across: take --lane-changes written")
-
-
 NO_DRIVER = {
     VehicleCategory.TRAILER: "a trailer has no driver",
     VehicleCategory.TRAIN: "a train is bound to its track",
@@ -272,12 +263,9 @@ def choose_drivers(
     egos: Mapping[str, str] | None = None,
     controllers: Mapping[str, Control] | None = None,
 ) -> Drivers:
-    """Per entity its profile, or why it gets none.
+    """Per entity its profile, or why it gets none: it is under test, or left to a controller.
 
-    `egos`: the vehicles under test, and why each is one; `controllers`: those of entities that are left to them.
-
-    Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
-    profile is not known.
+    Raises `FormatError`: the settings name an entity that there is not; `DriverProfileError`: a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
     asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
@@ -319,23 +307,15 @@ def _without_proving_grounds(
     drivers: Drivers, motion: NominalMotion, network: RoadNetwork, named: Iterable[str]
 ) -> Drivers:
     """Drivers, but for vehicles in a lone lane that is none of a road: why they get none. `named` ones keep theirs."""
-    kept = set(named)
     moved = dict(drivers)
     for entity in motion.entities:
-        if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in kept:
-            width, lanes = _usual_lane(entity, network)
-            if width > PROVING_GROUND_WIDTH and lanes <= 1.0:
+        if isinstance(moved.get(entity.name), DriverProfile) and entity.name not in set(named):
+            step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))  # a row a second
+            rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
+            road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
+            width = float(np.median(network.lane_width(road, lane, s))) if len(rows) else 0.0
+            if width > PROVING_GROUND_WIDTH and float(np.median(network.lane_index(road, lane, s)[1])) <= 1.0:
                 moved[entity.name] = (
                     f"lane of {width:.1f} m, a proving ground's: keeps its line (--entity NAME=PROFILE moves it)"
                 )
     return moved
-
-
-def _usual_lane(entity: EntityMotion, network: RoadNetwork) -> tuple[float, float]:
-    """Medians over a row a second: width of its lane [m], and driving lanes of its direction; 0 where it is in none."""
-    step = max(1, len(entity.time) // max(1, round(float(entity.time[-1] - entity.time[0]))))
-    rows = np.flatnonzero((entity.road[::step] >= 0) & (entity.lane[::step] != 0)) * step
-    if not len(rows):
-        return 0.0, 0.0
-    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
-    return float(np.median(network.lane_width(road, lane, s))), float(np.median(network.lane_index(road, lane, s)[1]))

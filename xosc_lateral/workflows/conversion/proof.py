@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.conversion.enrich import enrich
@@ -36,22 +36,16 @@ MINIMUM_SHIFT = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """A shift by one effect, measured between two conversions of a scenario with the same seeds.
+    """A shift by one effect, measured between two conversions of a scenario with the same seeds."""
 
-    - `columns`: what the effect goes by
-    - `scenario`: the template
-    - `vehicle`: who shows it most
-    - `start`, `end`: of the stretch: from its first to its last moment with half of the largest shift or more. [s]
-    - `shift`, `error`: mean over the stretch and over seeds, positive left, and its standard error over seeds. [m]
-    """
-
-    columns: tuple[str, ...]
-    scenario: str
-    vehicle: str
+    columns: tuple[str, ...]  # what the effect goes by
+    scenario: str  # the template
+    vehicle: str  # who shows it most
+    # start, end: of the stretch, from its first to its last moment with half of the largest shift or more [s]
     start: float
     end: float
-    shift: float
-    error: float
+    shift: float  # mean over the stretch and over seeds, positive left [m]
+    error: float  # its standard error over seeds [m]
 
     def __str__(self) -> str:
         """In words."""

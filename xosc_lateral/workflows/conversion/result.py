@@ -14,10 +14,9 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
-from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
 from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control
@@ -41,7 +40,7 @@ class LaneChanges(StrEnum):
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""
 
-WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
+MODE_WORDS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 """Modes of vehicles in words."""
 
 
@@ -70,8 +69,8 @@ class EntityResult:
     profile: DriverProfile | None  # None: not enriched, `why` says the reason
     why: str  # why it was not enriched; empty if it was
     segments: tuple[SampledSegment, ...]
-    deviation: FloatArray  # of the enriched path from the nominal one, positive left, shape (rows,) [m]
-    trajectory: WorldTrajectory  # the enriched path (the nominal one if not enriched)
+    deviation: FloatArray  # of that path from the nominal one, positive left, shape (rows,) [m]
+    trajectory: WorldTrajectory  # the enriched path; the nominal one of an entity that is neither enriched nor towed
     # neutral: context columns that the profile's effects ask for and that were not known: without effect
     neutral: tuple[str, ...] = ()
     # bound: that sampled movement was smoothed since nobody could have driven it: the worst segment's
@@ -139,8 +138,7 @@ class LaneDeparture:
 
     name: str
     time: float
-    beyond: float
-    """How far beyond the marking. [m]"""
+    beyond: float  # how far beyond the marking [m]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -189,7 +187,12 @@ class Enriched:
             f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             for departure in self.departures
         ]
-        lines += [line for entity in self.entities for line in _jumps(entity)]
+        lines += [
+            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
+            "ends, or its road has a gap; a lane change before it would avoid that"
+            for entity in self.entities
+            for time, length in leaps(entity.motion)
+        ]
         lines += [
             f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
             for entity in self.entities
@@ -197,14 +200,6 @@ class Enriched:
         ]
         lines += [f"{entity.name}: {entity.bound}" for entity in self.entities if entity.bound is not None]
         return tuple(lines)
-
-
-def _jumps(entity: EntityResult) -> list[str]:
-    return [
-        f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
-        "ends, or its road has a gap; a lane change before it would avoid that"
-        for time, length in leaps(entity.motion)
-    ]
 
 
 class EventShift(Struct, frozen=True):
@@ -235,7 +230,7 @@ class ConversionProvenance:
     options: Mapping[str, Any]  # what was asked for: `ConvertSettings.record`
     variant: int  # from 1, as in file names
     version: str  # of the standard that was written
-    ego: tuple[str, ...]  # vehicles under test: left as they are. Empty: there is none, and everything is replayed
+    ego: tuple[str, ...]  # vehicles under test: left as they are
     modes: Mapping[str, str]  # vehicle that was enriched -> "trajectory" or "lane-offset"
     content_sha256: str  # of the output without its provenance
 
@@ -256,7 +251,7 @@ class ConvertedScenario:
     movement: Enriched  # nominal and enriched motion, segments, gaps
     provenance: ConversionProvenance
     warnings: tuple[str, ...] = ()  # what a user has to know, a line each
-    content: bytes = b""  # the output's bytes, if they were not written
+    content: bytes = b""  # the output's bytes, but for a replay that was written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
     # shifts: how much earlier or later events of a reactive output come, the largest under several egos [s]
     shifts: tuple[EventShift, ...] = ()
@@ -280,7 +275,7 @@ class ConvertedScenario:
 
     @property
     def ego(self) -> tuple[str, ...]:
-        """Vehicles under test: left as they are; empty: there is none, and everything is replayed."""
+        """Vehicles under test: left as they are."""
         return self.provenance.ego
 
     @property

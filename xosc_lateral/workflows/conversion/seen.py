@@ -47,27 +47,21 @@ Contexts = Mapping[str, tuple[FloatArray, FloatArray]]
 class SeenSegment(NamedTuple):
     """A road-following segment as its driver sees it, or several and what lies between and beside them."""
 
-    spans: tuple[SegmentSpan, ...]
-    """One after another; see `movement_runs`."""
-    knots: IntArray
-    """Rows of the motion that are sampled, shape (n,)."""
-    segment: Segment
-    """In a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1."""
+    spans: tuple[SegmentSpan, ...]  # one after another; see `movement_runs`
+    knots: IntArray  # rows of the motion that are sampled, shape (n,)
+    segment: Segment  # in a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1
     side: float
-    responses: Responses
-    """See `responses_to`."""
+    responses: Responses  # see `responses_to`
 
 
 class Seen(NamedTuple):
     """All that a driver sees on his way, and how he answers to neighbours."""
 
     segments: tuple[SeenSegment, ...] = ()
-    neutral: tuple[str, ...] = ()
-    """Context columns that his profile asks for and that are not known."""
+    neutral: tuple[str, ...] = ()  # context columns that his profile asks for and that are not known
     responds: frozenset[str] = frozenset()
     """Sides on which the profile responds to neighbours by itself, as its population does."""
-    alone: frozenset[str] = frozenset()
-    """Sides on which that is known of the driver himself: nothing is borrowed."""
+    alone: frozenset[str] = frozenset()  # sides on which that is known of the driver himself: nothing is borrowed
 
 
 NOTHING_SEEN = Seen()
@@ -82,10 +76,7 @@ def seen_by(
     contexts: Contexts,
     neighbours: Neighbours,
 ) -> Seen:
-    """What the driver of an entity sees on runs of spans.
-
-    `motion` is the run of the scenario with those alone whose place beside him is certain.
-    """
+    """What the driver of an entity sees on runs of spans; in `motion` are those whose place beside him is certain."""
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[SeenSegment] = []
@@ -99,7 +90,9 @@ def seen_by(
                 _refuse_no_width(entity, span, network)
         segment = _segment(motion, network, index, knots, every, contexts)
         if neighbours is Neighbours.NONE:
-            segment = _with_nobody_beside(segment)
+            beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
+            emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
+            segment = replace(segment, context={**segment.context, **emptied})
         neutral |= {column for column in driver.columns if column not in segment.context}
         is_left_hand = network.roads[int(entity.road[knots[0]])].rule == "LHT"
         other_hand = is_left_hand != driver.left_hand
@@ -156,15 +149,6 @@ def _filled(values: FloatArray, inside: slice) -> FloatArray:
     return filled
 
 
-def _with_nobody_beside(segment: Segment) -> Segment:
-    emptied = {
-        name: np.full_like(values, np.nan if name.endswith("distance") else 0.0)
-        for name, values in segment.context.items()
-        if name in NEIGHBOURS
-    }
-    return replace(segment, context={**segment.context, **emptied})
-
-
 def going_on(segment: Segment, rows: int) -> Segment:
     """So many rows that follow a segment where everything stays as at its end."""
     last = segment.inside.stop
@@ -175,17 +159,12 @@ def going_on(segment: Segment, rows: int) -> Segment:
 
 
 def mirrored(segment: Segment) -> Segment:
-    """The segment with left and right exchanged.
-
-    Columns change places whose names differ in the word `left` or `right` alone (`left_distance`, `truck_right`);
-    curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
-    another name stays.
-    """
+    """The segment with left and right exchanged; see `mirrored_context`."""
     return replace(segment, context=mirrored_context(segment.context))
 
 
 def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Context columns with left and right exchanged; shapes and units as they are."""
+    """Context columns with left and right exchanged; one whose name has neither word stays."""
     columns = {other_side(name): values for name, values in context.items()}
     for name in OTHER_SIGN:
         if name in columns:

@@ -176,11 +176,7 @@ class ConvertSettings:
 
     @classmethod
     def of(cls, **options: Any) -> ConvertSettings:
-        """Settings from what a user says, else as configured; None: nothing is said.
-
-        Raises what `values_of` does; `FormatError`: it is the configuration that says so; there is no such road, or
-        folder of roads.
-        """
+        """Settings from what users say (see `values_of`), else as configured; `FormatError`: that, or no such road."""
         path, configured = configuration()
         values = say.values_of(cls, options)
         for name in (SETTINGS - values.keys()) & configured.keys():

@@ -78,10 +78,7 @@ def compare_runs(
     ignored: Collection[str] = (),
     ends: bool = True,
 ) -> Comparison:
-    """Compare a run with offsets with one without.
-
-    Ignored entities may end in any lane and touch each other; `ends`: both are to end at the same time.
-    """
+    """Compare runs with and without offsets; `ignored` entities may end in any lane and touch; `ends`: both at once."""
     then, now = _runs(before.actions), _runs(after.actions)
     shifts = _Shifts(scenario, network, before, after)
     changes: dict[str, Change] = {}

@@ -75,14 +75,6 @@ class Written:
 def write(plan: Plan, sampled: Enriched) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    return write_with([chain for entity in reactive for chain in _chains_of(entity, plan)], plan, sampled, vehicles)
-
-
-def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
-    """Write the output with these chains for those who get lane offsets."""
-    modes = dict.fromkeys((chain.entity for chain in chains), OutputMode.LANE_OFFSET.value)
-    modes |= dict.fromkeys(vehicles.trajectories, OutputMode.TRAJECTORY.value)
     folder, profiles = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
@@ -94,9 +86,23 @@ def write_with(chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, veh
         variant=plan.variant_index + 1,
         version=named(plan.version),
         ego=tuple(plan.egos),
-        modes={name: mode for name, mode in sorted(modes.items()) if sampled.entity(name).is_enriched},
+        modes={},
         content_sha256=PENDING,
     )
+    reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
+    chains = [chain for entity in reactive for chain in _chains_of(entity, plan)]
+    return write_with(chains, plan, sampled, vehicles, provenance)
+
+
+def write_with(
+    chains: Sequence[OffsetChain], plan: Plan, sampled: Enriched, vehicles: WrittenAs, provenance: ConversionProvenance
+) -> Written:
+    """Write the output with these chains for those who get lane offsets."""
+    modes = dict.fromkeys((chain.entity for chain in chains), OutputMode.LANE_OFFSET.value)
+    modes |= dict.fromkeys(vehicles.trajectories, OutputMode.TRAJECTORY.value)
+    enriched = sorted(entity.name for entity in sampled.entities if entity.is_enriched)
+    modes = {name: modes[name] for name in enriched if name in modes}
+    provenance = replace(provenance, modes=modes, content_sha256=PENDING)
     names = ", ".join(sorted({name for name, _ in provenance.profiles.values()})) or "no profile"
     sensor = ", with sensor" if plan.settings.with_sensor else ""
     file = write_converted(
@@ -174,10 +180,7 @@ def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
 def _path(
     entity: EntityResult, motion: NominalMotion, network: RoadNetwork, actions: Collection[LateralAction], end: float
 ) -> OffsetPath | None:
-    """From the start along what was sampled before the first lateral action and beyond it, to some offset. [m]
-
-    On one road alone, up to shortly before its end, where the place of each vertex is certain.
-    """
+    """From the start along what was sampled, to the offset `end` [m]; on one road, where each vertex has its place."""
     vehicle, paths = entity.motion, {action.path for action in actions}
     starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     until = min(starts, default=np.inf)
@@ -229,10 +232,7 @@ def _vertices(vehicle: EntityMotion, network: RoadNetwork, driven: FloatArray, l
 
 
 def _middle(entity: EntityResult, network: RoadNetwork) -> tuple[float, float]:
-    """Where an entity begins: +1 where +t is to its left, else -1; its nominal place along +t from the lane's centre.
-
-    [m]
-    """
+    """+1 where +t is to an entity's left at its begin, else -1; its place there along +t from the lane's centre [m]."""
     motion = entity.motion
     direction = float(network.travel_directions(motion.road[:1], motion.lane[:1])[0])
     along_lane = 1.0 if np.cos(motion.heading_relative[0]) >= 0.0 else -1.0

@@ -22,6 +22,7 @@ from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
+from xosc_lateral.drivers.model.group import rows_ahead
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
@@ -252,7 +253,7 @@ def _factor(factor: kinds.Factor) -> Shape:
 def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> tuple[dict[str, int], list[str]]:
     """Tables of the effects of columns; sizes of what they remember."""
     step, columns = profile.model.step, inputs_of(profile)
-    ahead = max((effect.response_in_blocks(step).ahead for effect in columned), default=0)
+    ahead = rows_ahead(profile)
     effects: list[str] = []
     components: list[str] = []
     shifts: list[tuple[int, float, float]] = []

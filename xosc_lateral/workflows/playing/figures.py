@@ -12,8 +12,8 @@ from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, 
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
 from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
-from xosc_lateral.world.motion.crossings import Crossing
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.lanes import DRIVING
 
 Rows = NDArray[np.int64]

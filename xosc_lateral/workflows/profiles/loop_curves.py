@@ -14,8 +14,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.close import LoopResult
-from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
-from xosc_lateral.drivers.loop.model import latent_path
+from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.terms.between import is_between
 from xosc_lateral.drivers.loop.terms.regimes import RegimesTerm
 from xosc_lateral.drivers.loop.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean
@@ -112,7 +111,7 @@ def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
 
 def _fast(offset: FloatArray, timeline: Timeline) -> FloatArray:
     """Movement within 20 s, shape (n,). [m]"""
-    return offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+    return offset - local_mean(offset, timeline.valid, LOCAL_S)
 
 
 def _binned(
@@ -148,7 +147,7 @@ class MovingStatistic:
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many `seconds` > 0. [m]"""
     timeline = result.coarse.timeline
-    return _moving(result, lambda runs: local_mean(runs.mean(axis=0), timeline.valid, seconds, timeline.step))
+    return _moving(result, lambda runs: local_mean(runs.mean(axis=0), timeline.valid, seconds))
 
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
@@ -156,7 +155,7 @@ def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
     timeline = result.coarse.timeline
 
     def spread(runs: FloatArray) -> FloatArray:
-        squares = [local_mean(_fast(run, timeline) ** 2, timeline.valid, seconds, timeline.step) for run in runs]
+        squares = [local_mean(_fast(run, timeline) ** 2, timeline.valid, seconds) for run in runs]
         return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
     return _moving(result, spread)
@@ -173,7 +172,7 @@ def _moving(result: LoopResult, statistic: Callable[[FloatArray], FloatArray]) -
 def hidden_mean(result: LoopResult) -> FloatArray:
     """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
-    paths = [latent_path(term, fitted) for term in fitted.terms if not term.columns]
+    paths = [fitted.path(term) for term in fitted.terms if not term.columns]
     hidden = np.sum([np.zeros(len(coarse)), *paths], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest_run(result)])
 

@@ -11,7 +11,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.evaluation.spectra import gapped_spectrum
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
-from xosc_lateral.drivers.loop.cross_validation import hold_out_blocks
+from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.residual import LOCAL_QUANTILES
 from xosc_lateral.drivers.loop.timeline import coarse_mean

@@ -10,9 +10,8 @@ from typing import Any
 
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.evaluation.metrics import Distances
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
-from xosc_lateral.drivers.loop.feedback import Feedback
+from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.loop.selection import Gain
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import profile_hash
@@ -24,18 +23,29 @@ MEASURE = (
     "time, movement by frequency band, quantiles of local spread) on held-out blocks, m"
 )
 
+FINDING_FIELDS = (
+    *("effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "size_error"),
+    *("p_value", "error_before", "error_after"),
+)
+
 
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
+    left, scores, known = result.lack_of_fit, result.scores, result.explained
     return {
-        "drives": list(result.names),
+        "drives": list(result.coarse.timeline.names),
         "base_profile": _profile(result.base) | {"given": result.base_given, "in_sample": result.in_sample},
         "refined_profile": _profile(result.refined),
-        "held_out": result.held_out,
+        "held_out": held_out_words(result.coarse.timeline),
         "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
         "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
-        "consequences": [_feedback(item) for item in result.identified.usable.feedback],
+        "consequences": [
+            {"column": item.column, "why": feedback_words(item), "doubtful": item.doubtful}
+            | {"coherence": item.coherence, "predicted_share": item.predicted_share}
+            | {"function_of_offset": item.function}
+            for item in result.identified.usable.feedback
+        ],
         "rejected": [
             {"columns": list(item.columns), "look": item.component, "p_value": item.p_value, "why": item.why}
             | {"taken_back": item.was_found}
@@ -44,14 +54,30 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
-        "explained": _explained(result),
+        "explained": known
+        and {
+            "share": known.share if known.is_known else None,
+            "interval": list(known.interval) if known.is_known else None,
+            **{"after_nat_per_block": known.after, "free_nat_per_block": known.free},
+        },
         "returned_base": result.identified.returned_base or None,
-        "unexplained": _unexplained(result),
+        "unexplained": {
+            "measure": "root of error after squared minus floor squared, m",
+            "size_m": left.unexplained,
+            "p_value": left.p_value,
+            "clear": left.is_clear,
+            "where": [group.name for group in left.where] if left.is_clear else [],
+            "sentence": lack_of_fit_words(result),
+            "omnibus": asdict(result.remainder) | {"within_chance": result.remainder.silent},
+        },
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
-            for group in result.lack_of_fit.groups
+            for group in left.groups
         ],
-        "metrics": {when: _metrics(getattr(result.scores, when)) for when in ("before", "after", "floor")},
+        "metrics": {
+            when: {} if distances is None else dict(distances.by_metric)
+            for when, distances in (("before", scores.before), ("after", scores.after), ("floor", scores.floor))
+        },
         "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
     }
 
@@ -65,76 +91,23 @@ def column_record(column: str, result: LoopResult) -> dict[str, Any]:
     return {"column": column, "role": assigned.role.value, "by": assigned.source or None, "use": used}
 
 
-def _interval(finding: Finding) -> list[float]:
-    """Of its size, 95 %. [m], or a factor"""
-    about = NORMAL_95 * finding.size_error
-    return [finding.size_m - about, finding.size_m + about]
-
-
-def _feedback(item: Feedback) -> dict[str, Any]:
-    return {
-        "column": item.column,
-        "why": feedback_words(item),
-        "doubtful": item.doubtful,
-        "coherence": item.coherence,
-        "predicted_share": item.predicted_share,
-        "function_of_offset": item.function,
-    }
-
-
-def _explained(result: LoopResult) -> dict[str, Any] | None:
-    known = result.explained
-    if known is None:
-        return None
-    gains = {"after_nat_per_block": known.after, "free_nat_per_block": known.free}
-    if not known.is_known:
-        return {"share": None, "interval": None} | gains
-    return {"share": known.share, "interval": list(known.interval)} | gains
-
-
-def _unexplained(result: LoopResult) -> dict[str, Any]:
-    return {
-        "measure": "root of error after squared minus floor squared, m",
-        "size_m": result.lack_of_fit.unexplained,
-        "p_value": result.lack_of_fit.p_value,
-        "clear": result.lack_of_fit.is_clear,
-        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.is_clear else [],
-        "sentence": lack_of_fit_words(result),
-        "omnibus": asdict(result.remainder) | {"within_chance": result.remainder.silent},
-    }
-
-
 def finding_record(finding: Finding) -> dict[str, Any]:
     """One finding of the JSON result, with its uncertainty and what the profile got."""
-    return {
-        "effect": finding.effect,
-        "kind": finding.kind,
+    passage, about = finding.passage, NORMAL_95 * finding.size_error
+    return {name: getattr(finding, name) for name in FINDING_FIELDS} | {
         "columns": list(finding.columns),
-        "lag_s": finding.lag_s,
-        "response_s": finding.response_s,
-        "shape": finding.shape,
-        "size_m": finding.size_m,
-        "size_error": finding.size_error,
-        "p_value": finding.p_value,
-        "error_before": finding.error_before,
-        "error_after": finding.error_after,
         "measure": f"{finding.measure}, m",
         "alike": sorted({name for columns in finding.alike for name in columns} - set(finding.columns)),
         "instead": [list(columns) for columns in finding.alike],
-        "interval": _interval(finding),
+        "interval": [finding.size_m - about, finding.size_m + about],
         "held_out_gain": _gain(finding.gain),
-        "passage": _passage(finding),
+        "passage": passage
+        and {
+            **{"from": passage.usual, "to": passage.high, "lasts_s": passage.lasts_s},
+            **{"time_s": list(passage.time), "path_m": list(passage.path), "path_error_m": list(passage.error)},
+        },
         "added": [effect.to_dict() for effect in finding.effects],
     }
-
-
-def _passage(finding: Finding) -> dict[str, Any] | None:
-    """The path through a typical passage of the column, by the second."""
-    passage = finding.passage
-    if passage is None:
-        return None
-    path = {"time_s": list(passage.time), "path_m": list(passage.path), "path_error_m": list(passage.error)}
-    return {"from": passage.usual, "to": passage.high, "lasts_s": passage.lasts_s} | path
 
 
 def finite(value: Any) -> Any:
@@ -162,7 +135,3 @@ def _profile(profile: DriverProfile) -> dict[str, Any]:
         "sha256": profile_hash(profile),
         "effects": len(profile.effects),
     }
-
-
-def _metrics(distances: Distances | None) -> dict[str, float]:
-    return {} if distances is None else dict(distances.by_metric)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.held_out import SNIPPET_ROWS
-from xosc_lateral.drivers.loop.residual import GroupError
+from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
@@ -21,7 +21,7 @@ from xosc_lateral.workflows.profiles.loop_figures import (
 )
 from xosc_lateral.workflows.profiles.loop_json import column_record
 from xosc_lateral.workflows.profiles.loop_words import (
-    CERTAIN,
+    CERTAIN_P_VALUE,
     COMPONENT_WORDS,
     SPREAD,
     explained_words,
@@ -38,10 +38,8 @@ from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
 LEFT_ROWS = 8  # Rows of the table of what is left.
-BAD_RATIO, GOOD_RATIO = (
-    2.0,
-    1.2,
-)  # Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
+# Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
+BAD_RATIO, GOOD_RATIO = 2.0, 1.2
 
 
 def loop_text(result: LoopResult) -> str:
@@ -73,29 +71,38 @@ def finding_sentence(finding: Finding) -> str:
 
 def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
     """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
-    names = ", ".join(result.names) if len(result.names) <= NAMED_DRIVES else f"{len(result.names)} drives"
-    page = Page(f"Closed loop: {names}")
+    timeline = result.coarse.timeline
+    drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
+    page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(outcome(result))
-    page.key_figures(_numbers(result))
+    tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
+    page.key_figures(
+        [
+            KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
+            KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
+            KeyFigure(
+                f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"
+            ),
+        ]
+    )
     page.lead(f"{explained_words(result)} {lack_of_fit_words(result)}".strip())
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
     page.section("Consequences of the car's own movement")
     feedback = result.identified.usable.feedback
-    page.text(
-        "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel is. "
-        "They are not used as causes."
-        if feedback
-        else "None."
-    )
     if feedback:
+        page.text(
+            "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel "
+            "is. They are not used as causes."
+        )
         page.table([{"column": item.column, "reason": feedback_words(item)} for item in feedback])
+    else:
+        page.text("None.")
     page.section(
         "Tested and rejected",
         "The strongest candidate of each component that was not significant, and what was found and taken back.",
     )
-    rejected = result.identified.selection.rejected
     page.table(
         [
             {
@@ -104,7 +111,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
                 "p-value": item.p_value,
                 "reason": item.why,
             }
-            for item in rejected
+            for item in result.identified.selection.rejected
         ],
         formats={"p-value": ".2g"},
     )
@@ -117,12 +124,13 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
         "`--role COLUMN=ROLE`.",
     )
     page.section("How to read this page")
-    page.items(line.format(n_runs=len(result.scored.runs_after), certain=f"{CERTAIN:g}") for line in HOW_TO_READ)
+    runs = len(result.scored.runs_after)
+    page.items(line.format(n_runs=runs, certain=f"{CERTAIN_P_VALUE:g}") for line in HOW_TO_READ)
     return page.html(
         {
             "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
             "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
-            "held out": result.held_out,
+            "held out": held_out_words(timeline),
             "seed": result.seed,
             **{name: value[:16] for name, value in parsed_hashes(tables).items()},
         }
@@ -156,13 +164,17 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
     page.heading("All effects in numbers")
     timed = any(finding.lag_s is not None for finding in result.findings)
     page.table(
-        [_finding_row(finding, timed) for finding in result.findings],
+        [
+            {"effect": finding.effect, "shape": finding.shape, "size": size_words(finding)}
+            | ({"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {})
+            | {"p-value": finding.p_value}
+            | {"error before [mm]": 1000.0 * finding.error_before, "error after [mm]": 1000.0 * finding.error_after}
+            for finding in result.findings
+        ],
         "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
         "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
-        formats={
-            **{"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"},
-            **{"error before [mm]": ".1f", "error after [mm]": ".1f"},
-        },
+        formats={"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"}
+        | dict.fromkeys(("error before [mm]", "error after [mm]"), ".1f"),
     )
     if proofs:
         caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
@@ -209,7 +221,11 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
             )
     groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
     page.table(
-        [_group_row(group, result) for group in groups],
+        [
+            {"group": group_words(group.name, result), "before": 1000.0 * group.before, "after": 1000.0 * group.after}
+            | {"between halves": 1000.0 * group.floor, "ratio": group.after / group.floor if group.floor > 0 else None}
+            for group in groups
+        ],
         f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
         "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
         formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
@@ -243,7 +259,7 @@ def _add_movement(page: Page, result: LoopResult) -> None:
             for name in before
         ],
         f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
-        formats={"before": ".3f", "after": ".3f", "between halves": ".3f"},
+        formats=dict.fromkeys(("before", "after", "between halves"), ".3f"),
         tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
     )
     page.figure(
@@ -252,39 +268,6 @@ def _add_movement(page: Page, result: LoopResult) -> None:
         "before (dashed). Bars: minimum, mean, maximum.",
         "Ten violins, measured beside the profile after and before.",
     )
-
-
-def _numbers(result: LoopResult) -> list[KeyFigure]:
-    tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
-    return [
-        KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
-        KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
-        KeyFigure(f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"),
-    ]
-
-
-def _finding_row(finding: Finding, timed: bool) -> dict[str, object]:
-    """A row of the table of effects; lag and response only where one of them has any."""
-    timing: dict[str, object] = {"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {}
-    return {
-        "effect": finding.effect,
-        "shape": finding.shape,
-        "size": size_words(finding),
-        **timing,
-        "p-value": finding.p_value,
-        "error before [mm]": 1000.0 * finding.error_before,
-        "error after [mm]": 1000.0 * finding.error_after,
-    }
-
-
-def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
-    return {
-        "group": group_words(group.name, result),
-        "before": 1000.0 * group.before,
-        "after": 1000.0 * group.after,
-        "between halves": 1000.0 * group.floor,
-        "ratio": group.after / group.floor if group.floor > 0 else None,
-    }
 
 
 def _tone(value: float, floor: float) -> Tone:

@@ -3,88 +3,90 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
-from xosc_lateral.drivers.loop.feedback import BAND, FUNCTION, Feedback
+from xosc_lateral.drivers.loop.columns import BAND, FUNCTION, Feedback
 from xosc_lateral.drivers.loop.omnibus import DELAYS
 from xosc_lateral.drivers.loop.passage import Passage
-from xosc_lateral.drivers.loop.residual import LackOfFit
 from xosc_lateral.drivers.loop.selection import Rejected
 from xosc_lateral.drivers.loop.terms.time import CHANGE_WITH_TIME
 from xosc_lateral.drivers.loop.timeline import LOCAL_S
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 
-CERTAIN = 1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
+CERTAIN_P_VALUE = (
+    1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
+)
 NAMED_GROUPS = 4  # So many groups with the most left unexplained are named.
 GAP = "\N{NO-BREAK SPACE}"  # Between a number and its unit: they stay on one line.
 SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
 
 # Signs that a reader of a figure has to know.
-HINTS: Mapping[str, str] = MappingProxyType(
-    {
-        "curvature": "positive in left bends",
-        "crossfall": "positive: falls to the right",
-        "grade": "positive: rises ahead",
-        "lane_index": "0 is the rightmost lane",
-        "wind_direction": "90: blows to the left",
-    }
-)
+HINTS: Mapping[str, str] = {
+    "curvature": "positive in left bends",
+    "crossfall": "positive: falls to the right",
+    "grade": "positive: rises ahead",
+    "lane_index": "0 is the rightmost lane",
+    "wind_direction": "90: blows to the left",
+}
 
 # What is asked of each component.
-COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
-    {
-        "mean": "a column that changes the mean offset",
-        "course": "a column that changes the mean offset over a course of time",
-        "between": "a column that goes with the mean offset of whole drives",
-        "spread": "a column that changes the spread",
-        "slow_spread": "a column that changes the spread of slow movement",
-        "fine_noise": "a column that changes the fine noise",
-        "time_spread": "a spread that changes smoothly with time",
-        "regimes": "regimes of small and large spread",
-        "cycle": "a periodic oscillation",
-        "time_mean": "a mean offset that changes with time, smoothly or by a step",
-    }
-)
+COMPONENT_WORDS: Mapping[str, str] = {
+    "mean": "a column that changes the mean offset",
+    "course": "a column that changes the mean offset over a course of time",
+    "between": "a column that goes with the mean offset of whole drives",
+    "spread": "a column that changes the spread",
+    "slow_spread": "a column that changes the spread of slow movement",
+    "fine_noise": "a column that changes the fine noise",
+    "time_spread": "a spread that changes smoothly with time",
+    "regimes": "regimes of small and large spread",
+    "cycle": "a periodic oscillation",
+    "time_mean": "a mean offset that changes with time, smoothly or by a step",
+}
 
 # Groups of cells whose own name is not plain.
-_PLAIN_GROUPS: Mapping[str, str] = MappingProxyType(
-    {
-        "movement by band": "standard deviation by frequency band",
-        "spread by time": "spread by sixths of the drive",
-        "mean by effect: step 0": "mean before and after it",
-    }
-)
+_PLAIN_GROUPS: Mapping[str, str] = {
+    "movement by band": "standard deviation by frequency band",
+    "spread by time": "spread by sixths of the drive",
+    "mean by effect: step 0": "mean before and after it",
+}
 
-_HIDDEN: Mapping[str, str] = MappingProxyType(
-    {
-        "periodic": "The car oscillates at a steady frequency, whatever the road and the traffic do.",
-        "drift": (
-            "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
-            "camera whose calibration depends on temperature."
-        ),
-        "step": (
-            "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
-            "recalibrated camera, for example, or a change of driver."
-        ),
-        "scale": "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
-        "regime": (
-            "The movement switches between two levels of spread, and no column predicts when: distraction, for example."
-        ),
-        "memory": (
-            "How the car moves depends on more than its position one step ago. The core model is replaced by "
-            "`autoregressive`, which has a longer memory."
-        ),
-        "population": (
-            "The drivers keep to different positions and move by different amounts. The refined profile draws a driver "
-            "for every vehicle."
-        ),
-    }
-)
+FACTOR = f"factor{GAP}{{0:.2f}}{{1}}"
+# Of each kind of finding its size, with its error, and what it means where no column says so.
+KINDS: Mapping[str, tuple[str, str]] = {
+    "location": (f"{{0:+.2f}}{{1}}{GAP}m", ""),
+    "scale": (FACTOR, "The spread about the mean position changes smoothly over the drive: fatigue, or learning."),
+    "periodic": (
+        f"amplitude {{0:.2f}}{{1}}{GAP}m",
+        "The car oscillates at a steady frequency, whatever the road and the traffic do.",
+    ),
+    "drift": (
+        f"{{0:+.2f}}{{1}}{GAP}m",
+        "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
+        "camera whose calibration depends on temperature.",
+    ),
+    "step": (
+        f"{{0:+.2f}}{{1}}{GAP}m",
+        "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
+        "recalibrated camera, for example, or a change of driver.",
+    ),
+    "regime": (
+        FACTOR,
+        "The movement switches between two levels of spread, and no column predicts when: distraction, for example.",
+    ),
+    "memory": (
+        FACTOR,
+        "How the car moves depends on more than its position one step ago. The core model is replaced by "
+        "`autoregressive`, which has a longer memory.",
+    ),
+    "population": (
+        f"means scatter by {{0:.2f}}{{1}}{GAP}m",
+        "The drivers keep to different positions and move by different amounts. The refined profile draws a driver "
+        "for every vehicle.",
+    ),
+}
 
 
 def column_label(column: str, *, hint: bool = True) -> str:
@@ -104,55 +106,59 @@ def size_words(finding: Finding) -> str:
     effect = finding.effects[0] if finding.effects else None
     if finding.kind != "location" or not isinstance(effect, ColumnEffect):
         return _size(finding)
-    side = "left" if finding.size_m > 0 else "right"
+    further = f"{_size(finding).lstrip('+-')} further {_side(finding.size_m)}"
     if finding.over_time and finding.passage is not None:
-        return f"{_size(finding).lstrip('+-')} further {side} {_moment_words(finding.passage)}"
+        moment = float(finding.passage.time[finding.passage.at])
+        return f"{further} {_moment(moment) if moment else 'as it begins'} in a typical passage"
     rises = "as it rises" if len(finding.columns) == 1 else "from the low to the high end"
-    plain = f"{_size(finding).lstrip('+-')} further {side} {rises}"
-    return beside_words(effect, _share_of_error(finding)) or plain
+    return beside_words(effect, _share_of_error(finding)) or f"{further} {rises}"
+
+
+def _size(finding: Finding) -> str:
+    about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
+    return KINDS[finding.kind][0].format(finding.size_m, about)
 
 
 def _share_of_error(finding: Finding) -> float:
     return 2.0 * finding.size_error / abs(finding.size_m) if finding.size_m else 0.0
 
 
-def _size(finding: Finding) -> str:
-    size, about = finding.size_m, 2.0 * finding.size_error
-    if finding.kind == "memory":
-        return f"factor{GAP}{size:.2f}"
-    spread = f"{GAP}±{GAP}{about:.2f}" if about else ""
-    if finding.kind in ("scale", "dynamics", "regime"):
-        return f"factor{GAP}{size:.2f}{spread}"
-    sign = "+" if finding.kind in ("location", "step", "drift") else ""
-    what = {"population": "means scatter by ", "periodic": "amplitude "}.get(finding.kind, "")
-    return f"{what}{size:{sign}.2f}{spread}{GAP}m"
+def _side(shift: float) -> str:
+    return "left" if shift > 0 else "right"
+
+
+def _moment(seconds: float) -> str:
+    """A moment of a passage, against where the column begins to change. [s]"""
+    return f"{abs(seconds):.0f}{GAP}s {'before' if seconds < 0 else 'after'} it begins"
 
 
 def p_value_words(p_value: float) -> str:
     """How often tables without the effect show one as strong, in words."""
-    if p_value < CERTAIN:
+    if p_value < CERTAIN_P_VALUE:
         return "practically never"
     return f"in 1 of {1.0 / p_value:,.0f} tables".replace(",", GAP)
-
-
-def when_words(finding: Finding) -> str:
-    """Lag and response, or nothing; what goes with whole drives has neither."""
-    if finding.over_time:
-        return ""
-    if finding.lag_s is None or finding.response_s is None:
-        return "What counts is the mean of each drive, not changes within a drive." if finding.columns else ""
-    lag = finding.lag_s
-    start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s in advance" if lag < 0 else f"{lag:.1f} s later"
-    slow = f", with a response time of {finding.response_s:.1f} s" if finding.response_s > 0 else ""
-    return f"The driver responds {start}{slow}."
 
 
 def meaning(finding: Finding, result: LoopResult) -> str:
     """What an effect means, in sentences that need no statistics."""
     effect = finding.effects[0] if finding.effects else None
+    if isinstance(effect, ColumnEffect):
+        sentence = _column_sentence(finding, effect, result)
+    else:
+        change = "The mean position changes with time, and the drives do not tell in which form."
+        hidden = change if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
+        sentence = f"{hidden} ({finding.shape[0].upper()}{finding.shape[1:]}; {size_words(finding)}.)"
+    when = ""
+    if finding.lag_s is not None and finding.response_s is not None:
+        lag = finding.lag_s
+        start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s in advance" if lag < 0 else f"{lag:.1f} s later"
+        slow = f", with a response time of {finding.response_s:.1f} s" if finding.response_s > 0 else ""
+        when = f"The driver responds {start}{slow}."
+    elif finding.columns and not finding.over_time:
+        when = "What counts is the mean of each drive, not changes within a drive."
     words = [
-        _column_sentence(finding, effect, result) if isinstance(effect, ColumnEffect) else _hidden_sentence(finding),
-        when_words(finding),
+        sentence,
+        when,
         f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:
@@ -214,8 +220,12 @@ def taken_back_words(item: Rejected) -> str:
 def lack_of_fit_words(result: LoopResult) -> str:
     """What is left unexplained, in a sentence."""
     left = result.lack_of_fit
+    if left.unexplained == 0.0:
+        total = "Taken together, the residuals do not exceed the difference between halves of the drives."
+        return f"{total} {_remainder_words(result)}"
     if not left.is_clear:
-        return f"{_total_words(left)} {_remainder_words(result)}"
+        share = f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
+        return f"The error after is above that between halves, but {share} {_remainder_words(result)}"
     where = ", ".join(
         f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
         for group in left.where[:NAMED_GROUPS]
@@ -239,16 +249,6 @@ def explained_words(result: LoopResult) -> str:
     return (
         f"On held-out blocks, chosen and fitted without them, the effects explain {share}{GAP}% (95{GAP}% interval "
         f"{low} to {high}{GAP}%) of what a free linear response to all columns explains of the mean."
-    )
-
-
-def _total_words(left: LackOfFit) -> str:
-    """What the summary statistics say where they say nothing clear."""
-    if left.unexplained == 0.0:
-        return "Taken together, the residuals do not exceed the difference between halves of the drives."
-    return (
-        "The error after is above that between halves, but "
-        f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
     )
 
 
@@ -280,30 +280,20 @@ def group_words(name: str, result: LoopResult) -> str:
     return _PLAIN_GROUPS.get(name, name)
 
 
-def _hidden_sentence(finding: Finding) -> str:
-    sentence = _HIDDEN.get(finding.kind, "")
-    if finding.effect == CHANGE_WITH_TIME:
-        sentence = "The mean position changes with time, and the drives do not tell in which form."
-    detail = f"{finding.shape}; {size_words(finding)}"
-    return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
-
-
 # Where a driver is, by the column that says so.
-PLACES_BY_COLUMN: Mapping[str, str] = MappingProxyType(
-    {
-        "left_distance": "beside vehicles on his left",
-        "right_distance": "beside vehicles on his right",
-        "car_left": "beside cars on his left",
-        "car_right": "beside cars on his right",
-        "truck_left": "beside trucks on his left",
-        "truck_right": "beside trucks on his right",
-        "left_is_truck": "when the next vehicle on his left is a truck",
-        "right_is_truck": "when the next vehicle on his right is a truck",
-        "lead_distance": "behind a vehicle ahead",
-        "lead_is_truck": "when the vehicle ahead is a truck",
-        "oncoming_distance": "when somebody comes towards him",
-    }
-)
+PLACES_BY_COLUMN: Mapping[str, str] = {
+    "left_distance": "beside vehicles on his left",
+    "right_distance": "beside vehicles on his right",
+    "car_left": "beside cars on his left",
+    "car_right": "beside cars on his right",
+    "truck_left": "beside trucks on his left",
+    "truck_right": "beside trucks on his right",
+    "left_is_truck": "when the next vehicle on his left is a truck",
+    "right_is_truck": "when the next vehicle on his right is a truck",
+    "lead_distance": "behind a vehicle ahead",
+    "lead_is_truck": "when the vehicle ahead is a truck",
+    "oncoming_distance": "when somebody comes towards him",
+}
 
 FAR_DISTANCE = 200.0  # Free space at which others count as far away. [m]
 
@@ -317,41 +307,19 @@ def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
     """
     if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in PLACES_BY_COLUMN:
         return ""
-    column = effect.columns[0]
-    if not column.endswith("distance"):
+    column, begins = effect.columns[0], ""
+    if column.endswith("distance"):
+        free = np.linspace(0.0, FAR_DISTANCE, 2001)
+        place = effect.weighed(effect.quantity({column: free}))
+        away = place - place[-1]
+        shift = float(away[np.argmax(np.abs(away))])
+        reach = float(free[np.flatnonzero(np.abs(away) >= abs(shift) * np.exp(-1.0))[-1]])
+        begins = f", from {reach:.0f}{GAP}m on" if 0.0 < reach < FAR_DISTANCE - 1.0 else ""
+    else:
         off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
-        return _moves(float(on - off), error, PLACES_BY_COLUMN[column], "")
-    free = np.linspace(0.0, FAR_DISTANCE, 2001)
-    place = effect.weighed(effect.quantity({column: free}))
-    shift = place - place[-1]
-    largest = int(np.argmax(np.abs(shift)))
-    near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
-    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR_DISTANCE - 1.0 else ""
-    return _moves(float(shift[largest]), error, PLACES_BY_COLUMN[column], begins)
-
-
-def _moves(shift: float, error: float, where: str, begins: str) -> str:
+        shift = float(on - off)
     about = f"{GAP}±{GAP}{abs(shift) * error:.2f}" if error else ""
-    return f"moves {abs(shift):.2f}{about}{GAP}m {'left' if shift > 0 else 'right'} {where}{begins}"
-
-
-def _moment_words(passage: Passage) -> str:
-    """When the car is farthest, against where the column begins to change."""
-    seconds = float(passage.time[passage.at])
-    when = (
-        "as it begins"
-        if seconds == 0.0
-        else f"{abs(seconds):.0f}{GAP}s {'before' if seconds < 0 else 'after'} it begins"
-    )
-    return f"{when} in a typical passage"
-
-
-def passage_words(passage: Passage, column: str) -> str:
-    """A typical passage of a column in numbers."""
-    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
-    rises = f"from {passage.usual:.3g} to" if np.isfinite(passage.usual) else "from none to"
-    hint = f"; {HINTS[column]}" if column in HINTS else ""
-    return f"`{column}` {rises} {passage.high:.3g}{GAP}{unit}".rstrip() + f" for {passage.lasts_s:.0f}{GAP}s{hint}"
+    return f"moves {abs(shift):.2f}{about}{GAP}m {_side(shift)} {PLACES_BY_COLUMN[column]}{begins}"
 
 
 def _passage_sentence(passage: Passage, column: str) -> str:
@@ -360,12 +328,13 @@ def _passage_sentence(passage: Passage, column: str) -> str:
     for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest_shift[0]) * passage.path)))):
         size, error = float(passage.path[at]), 2.0 * float(passage.error[at])
         if not sides or abs(size) > error:
-            when = float(passage.time[at])
-            before = f"{abs(when):.0f}{GAP}s {'before' if when < 0 else 'after'} it begins"
-            sides.append(
-                f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m to the {'left' if size > 0 else 'right'} {before}"
-            )
-    return f"In a typical passage ({passage_words(passage, column)}) the car is farthest out {', and '.join(sides)}."
+            moment = _moment(float(passage.time[at]))
+            sides.append(f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m to the {_side(size)} {moment}")
+    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
+    rises = f"from {passage.usual:.3g} to" if np.isfinite(passage.usual) else "from none to"
+    hint = f"; {HINTS[column]}" if column in HINTS else ""
+    typical = f"`{column}` {rises} {passage.high:.3g}{GAP}{unit}".rstrip() + f" for {passage.lasts_s:.0f}{GAP}s{hint}"
+    return f"In a typical passage ({typical}) the car is farthest out {', and '.join(sides)}."
 
 
 def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
@@ -373,24 +342,18 @@ def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult)
         return _passage_sentence(finding.passage, effect.columns[0])
     if words := beside_words(effect, _share_of_error(finding)):
         return f"The driver {words} (`{effect.columns[0]}`)."
-    more = finding.size_m > (0.0 if effect.acts is Acts.LOCATION else 1.0)
     size = _size(finding).lstrip("+-")
-    if effect.acts is Acts.LOCATION:
-        does = f"drives {size} further {'left' if more else 'right'}"
-        subject = "the car"
-    else:
-        subject = {
-            Acts.SPREAD: "the movement about the mean",
-            Acts.FINE: "the fine noise",
-            Acts.RATE: "the rate of mean reversion",
-        }[effect.acts]
-        does = f"changes by a {size}"
-    return f"{_between(effect, result)}, {subject} {does}."
+    does = {
+        Acts.LOCATION: f"the car drives {size} further {_side(finding.size_m)}",
+        Acts.SPREAD: f"the movement about the mean changes by a {size}",
+        Acts.FINE: f"the fine noise changes by a {size}",
+        Acts.RATE: f"the rate of mean reversion changes by a {size}",
+    }
+    return f"{_between(effect, result)}, {does[effect.acts]}."
 
 
 def _between(effect: ColumnEffect, result: LoopResult) -> str:
-    coarse = result.coarse
-    inside = coarse.timeline.valid
+    """From where to where an effect's columns go."""
     if isinstance(effect, Levels):
         levels = " or ".join(f"{level:g}" for level in effect.levels)
         return f"Where `{effect.column}` is {levels}, compared with elsewhere"
@@ -399,22 +362,16 @@ def _between(effect: ColumnEffect, result: LoopResult) -> str:
     column = effect.columns[0]
     if isinstance(effect, Angular):
         return f"From the `{column}` of the weakest to that of the strongest effect (the middle 90 % of the time)"
-    return _over_values(effect, column, coarse.context[column][inside])
-
-
-def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -> str:
-    """From where to where a column of these values goes."""
+    seen, name = result.coarse.context[column][result.coarse.timeline.valid], f"`{column}`"
     seen = seen[np.isfinite(seen)]
-    name = f"`{column}`"
     if isinstance(effect, Magnitude):
         seen, name = np.abs(seen), f"the magnitude of `{column}`"
     if set(np.unique(seen)) <= {0.0, 1.0}:
         return f"While `{column}` is on"
     low, high = np.quantile(seen, [0.05, 0.95])
-    unit = CONTEXT_UNITS.get(column, "")
-    unit = "" if unit in ("", "-") else f" {unit}"
+    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
     name += f" ({HINTS[column]})" if column in HINTS else ""
-    return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
+    return f"As {name} goes from {low:.3g} to {high:.3g}{unit and ' '}{unit} (5 % and 95 % quantile of these drives)"
 
 
 def _mm(value: float) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVehicle
-from xosc_lateral.world.motion.crossings import bell_share
+from xosc_lateral.world.motion.segments import bell_share
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
 SETTLED_OFFSET = 0.7  # nobody has settled in a lane who is farther from its centre, see `recordings.cuts` [m]

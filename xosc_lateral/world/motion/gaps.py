@@ -44,23 +44,18 @@ class BoxPath(Struct, frozen=True, eq=False):
     name: str
     x: FloatArray
     y: FloatArray
-    heading: FloatArray
-    """Shape (n,). Pose of the reference point; NaN where the vehicle is absent. [m], [rad]"""
+    heading: FloatArray  # x to heading: of the reference point, shape (n,); NaN where absent [m], [rad]
     length: float
-    width: float
-    """Of the box. [m]"""
-    centre: float
-    """Box centre ahead of the reference point. [m]"""
+    width: float  # length, width: of the box [m]
+    centre: float  # box centre ahead of the reference point [m]
 
 
 class Gap(Struct, frozen=True):
     """Smallest free space between two vehicles over a run; 0: they touch."""
 
     names: tuple[str, str]
-    distance: float
-    """[m]"""
-    time: float
-    """When it is reached first. [s]"""
+    distance: float  # [m]
+    time: float  # when it is reached first [s]
 
     @property
     def touches(self) -> bool:
@@ -84,16 +79,16 @@ def gaps_of(motion: NominalMotion, paths: Sequence[WorldTrajectory | EntityMotio
     return smallest_gaps(motion.entities[0].time[::every], boxes)
 
 
-def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = MAXIMUM_GAP) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles that come within `reach` [m] of each other, on one time grid [s]."""
+def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath]) -> tuple[Gap, ...]:
+    """Smallest gap of each pair of vehicles that come within `MAXIMUM_GAP` of each other, on one time grid [s]."""
     smallest: dict[tuple[int, int], Gap] = {}
-    for part in _together(_near_pairs(paths, reach)):
+    for part in _together(_near_pairs(paths)):
         a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
         distances = box_distance(corners(a), corners(b))
         ends = np.cumsum([len(near) for _, near in part])
         for (pair, near), distance in zip(part, np.split(distances, ends[:-1]), strict=True):
             best = int(np.argmin(distance))
-            if distance[best] <= reach and not (pair in smallest and smallest[pair].distance <= distance[best]):
+            if distance[best] <= MAXIMUM_GAP and not (pair in smallest and smallest[pair].distance <= distance[best]):
                 names = paths[pair[0]].name, paths[pair[1]].name
                 smallest[pair] = Gap(names, float(distance[best]), float(time[near[best]]))
     return tuple(smallest[pair] for pair in sorted(smallest))
@@ -102,17 +97,17 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
 _NearPair = tuple[tuple[int, int], NDArray[np.intp]]
 
 
-def _near_pairs(paths: Sequence[BoxPath], reach: float) -> Iterator[_NearPair]:
+def _near_pairs(paths: Sequence[BoxPath]) -> Iterator[_NearPair]:
     """Pairs that come near each other, and rows of a stretch on which their gap may be the smallest."""
     extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
     x, y = [path.x for path in paths], [path.y for path in paths]
-    for rows, pairs in stretches_within(x, y, reach + 2 * extent):
+    for rows, pairs in stretches_within(x, y, MAXIMUM_GAP + 2 * extent):
         for first, second in pairs:
             a, b = paths[first], paths[second]
             half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
             between = np.hypot(a.x[rows] - b.x[rows], a.y[rows] - b.y[rows])
             apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
-            near = np.flatnonzero(apart <= reach)
+            near = np.flatnonzero(apart <= MAXIMUM_GAP)
             if len(near):
                 # the exact distance is only needed where a lower bound of it undercuts the best upper bound
                 upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
@@ -148,20 +143,14 @@ _POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distance between rectangles, row by row, shape (n,); 0 where they overlap. [m]
-
-    From their corners in order, shape (n, 4, 2). [m]
-    """
+    """Distance between rectangles from their corners in order, row by row, (n, 4, 2) to (n,); 0: they overlap. [m]"""
     from_a, apart_of_a = _beyond(a, b)
     from_b, apart_of_b = _beyond(b, a)
     return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
 
 
 def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
-
-    Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.
-    """
+    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them."""
     x, y = (np.ascontiguousarray(corners[..., k].T) - 0.5 * (box[:, 0, k] + box[:, 2, k]) for k in (0, 1))
     outside, parted = [], np.zeros(len(box), dtype=bool)
     for neighbour in (1, 3):

@@ -48,31 +48,22 @@ class Activity(IntFlag):
 class EntityMotion:
     """One entity's rows, one per step, from time 0 to the end; arrays of shape (n,)."""
 
-    entity: Entity
-    """Name, category, bounding box, performance."""
-    time: FloatArray
-    """[s] from scenario start, uniform."""
+    entity: Entity  # name, category, bounding box, performance
+    time: FloatArray  # [s] from scenario start, uniform
     x: FloatArray
     y: FloatArray
     z: FloatArray
     heading: FloatArray
     pitch: FloatArray
-    roll: FloatArray
-    """Pose of the reference point (rear axle). [m], [rad]"""
-    speed: FloatArray
-    """Signed scalar speed. [m/s]"""
-    road: Int32Array
-    """Index into `RoadNetwork.road_ids`; -1 where the entity is on no road."""
-    lane: Int32Array
-    """OpenDRIVE lane id; 0 where on no road."""
-    s: FloatArray
-    """Along the road's reference line. [m]"""
-    offset: FloatArray
-    """From the centre of `lane`, positive to the LEFT of the lane's direction of travel. [m]"""
+    roll: FloatArray  # x to roll: pose of the reference point (rear axle) [m], [rad]
+    speed: FloatArray  # signed scalar speed [m/s]
+    road: Int32Array  # index into `RoadNetwork.road_ids`; -1 where the entity is on no road
+    lane: Int32Array  # OpenDRIVE lane id; 0 where on no road
+    s: FloatArray  # along the road's reference line [m]
+    offset: FloatArray  # from the centre of `lane`, positive to the LEFT of the lane's direction of travel [m]
     heading_relative: FloatArray
     """Turn from the lane's direction of travel, about the normal of the road's surface. [rad]"""
-    activity: NDArray[np.uint8]
-    """`Activity` bits."""
+    activity: NDArray[np.uint8]  # `Activity` bits
 
     @property
     def name(self) -> str:
@@ -84,16 +75,11 @@ class EntityMotion:
 class PlayedAction:
     """An action that the player started (and perhaps ended)."""
 
-    action: Any
-    """The action of `xosc_lateral.world.scenario`, with its place in the file."""
-    actor: str | None
-    """Entity acting; None for global and user-defined actions."""
-    path: tuple[str, ...]
-    """Names from story to action; ``("Init",)`` for init actions."""
-    start: float
-    """Time of the frame in which it started. [s]"""
-    end: float | None
-    """Time at which it ended; None: still running at the end of the run. [s]"""
+    action: Any  # the action of `xosc_lateral.world.scenario`, with its place in the file
+    actor: str | None  # entity acting; None for global and user-defined actions
+    path: tuple[str, ...]  # names from story to action; ``("Init",)`` for init actions
+    start: float  # time of the frame in which it started [s]
+    end: float | None  # time at which it ended; None: still running at the end of the run [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,17 +104,11 @@ CUT_OFF = "still runs at the time limit"
 class NominalMotion:
     """A played scenario."""
 
-    step: float
-    """[s]"""
-    entities: tuple[EntityMotion, ...]
-    """In the scenario's order."""
-    actions: tuple[PlayedAction, ...]
-    """Every action started, in order of start."""
-    end_time: float
-    """[s]"""
-    ended_by: str
-    """``"stop trigger"`` or ``"time limit"`` or what else ended the run."""
-    notes: tuple[Note, ...]
-    """What could not be played as written."""
+    step: float  # [s]
+    entities: tuple[EntityMotion, ...]  # in the scenario's order
+    actions: tuple[PlayedAction, ...]  # every action started, in order of start
+    end_time: float  # [s]
+    ended_by: str  # ``"stop trigger"`` or ``"time limit"`` or what else ended the run
+    notes: tuple[Note, ...]  # what could not be played as written
     cut_off: Note | None = None
     """Says that the time limit came before the scenario's end, or before all its stories were over."""

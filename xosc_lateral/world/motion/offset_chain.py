@@ -114,10 +114,7 @@ def resized(chain: OffsetChain, size: Size) -> OffsetChain:
 
 
 def ring_along(time: FloatArray, offset: FloatArray, *, from_middle: bool) -> Ring:
-    """The ring that follows offsets (positive left), shape (n,), and then leads back to the first one. [s], [m]
-
-    It begins where the path first turns back, or, `from_middle`, where it is near to 0 and drifts little.
-    """
+    """The closed ring along offsets [m] over time [s]; it begins at a turn or, `from_middle`, where it is near to 0."""
     grid = np.arange(time[0], time[-1] + 1e-9, GRID)
     path = closed(np.interp(grid, time, offset))
     rate = _rate(path)

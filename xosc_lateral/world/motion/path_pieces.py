@@ -113,10 +113,7 @@ def _interpolated(moments: FloatArray, time: FloatArray, values: FloatArray) -> 
 
 
 def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Without vertices that lie closer to their neighbours in the plane than along the way; the ends stay.
-
-    Where even the ends are that close (the entity came back to where it began), the first alone: no path to follow.
-    """
+    """Without vertices too close to their neighbours in the plane; the ends stay, or the first alone: no path."""
     if (np.hypot(np.diff(x), np.diff(y)) >= LEAST_SPACING).all():
         return times
     kept = [0]
@@ -154,10 +151,7 @@ def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) ->
 
 
 def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: _Error, *, replace: bool) -> FloatArray:
-    """With a vertex in every gap that needs one, on its worst row.
-
-    `replace`: only where the error is large, but then vertices too close to that row give way to it, but for the ends.
-    """
+    """A vertex on the worst row of each gap that needs one; `replace`: those too close give way to large errors'."""
     if not (error.there > (LARGE_ERROR if replace else TOLERANCE)).any():
         return times
     at = _interpolated(times, time, way)
@@ -239,10 +233,7 @@ def _reversals(x: FloatArray, y: FloatArray, first: int, last: int) -> list[int]
 
 
 def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> tuple[float, FloatArray]:
-    """`VERTEX_STEP`, or less where the piece holds a bend that gaps of that length would cut; and its `_head` then.
-
-    The same everywhere: where gaps change, a player that turns the car within half a gap turns it more sharply.
-    """
+    """`VERTEX_STEP`, or less for bends that it would cut, the same everywhere; and the piece's `_head` then."""
     end = float(time[-1])
     for step in (VERTEX_STEP, VERTEX_STEP / 2.0):
         head = _head(time, way, end, step)

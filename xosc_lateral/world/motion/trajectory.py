@@ -39,18 +39,14 @@ _MAXIMUM_LATERAL_SPEED = 10.0
 class WorldTrajectory:
     """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
 
-    time: FloatArray
-    """[s]"""
+    time: FloatArray  # [s]
     x: FloatArray
     y: FloatArray
-    z: FloatArray
-    """[m]"""
+    z: FloatArray  # x, y, z [m]
     heading: FloatArray
     pitch: FloatArray
-    roll: FloatArray
-    """[rad]"""
-    speed: FloatArray
-    """Along the path, negative when driving backwards. [m/s]"""
+    roll: FloatArray  # heading, pitch, roll [rad]
+    speed: FloatArray  # along the path, negative when driving backwards [m/s]
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
@@ -67,10 +63,7 @@ def distance_driven(motion: EntityMotion) -> FloatArray:
 
 
 def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
-    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet.
-
-    What a scenario places anew is none (`Activity.TELEPORTED`).
-    """
+    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet."""
 
     def moved(around: slice) -> FloatArray:
         return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
@@ -88,11 +81,7 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
 
 
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
-    """Shift a motion sideways in lane coordinates; headings and speeds follow from the shifted path.
-
-    The deviation [m], shape (n,), is added to the nominal offset, positive to the left of the vehicle's travel; it is
-    ignored where the vehicle is on no road.
-    """
+    """Shift motion to its left by a deviation [m], where it is on a road; headings and speeds follow from the path."""
     n = len(motion.time)
     x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
     heading, speed = motion.heading, motion.speed
@@ -122,14 +111,6 @@ def _shifted(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
         yield shifted
 
 
-def _pieces(motion: EntityMotion) -> list[slice]:
-    """Runs of rows between which the entity was not placed anew."""
-    n = len(motion.time)
-    cut = rows_where(n, lambda rows: (motion.activity[rows] & Activity.TELEPORTED) != 0)
-    borders = sorted({0, *cut.tolist(), n})
-    return [slice(a, b) for a, b in pairwise(borders)]
-
-
 def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:
     """Rows of a piece in blocks; with a row more on each side, for derivatives; those counted in these."""
     for rows in blocks(piece.stop, piece.start):
@@ -144,7 +125,8 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
     times the ratio of path lengths, which stays right at a speed step.
     """
     heading, speed = empty(len(x)), empty(len(x))
-    for piece in _pieces(motion):
+    placed_anew = rows_where(len(x), lambda rows: (motion.activity[rows] & Activity.TELEPORTED) != 0)
+    for piece in (slice(a, b) for a, b in pairwise(sorted({0, *placed_anew.tolist(), len(x)}))):
         if piece.stop - piece.start < 2:
             put(heading, piece, motion.heading[piece] + 0.0)
             put(speed, piece, motion.speed[piece])
@@ -237,10 +219,8 @@ SETTLING_TIME = 3.0
 class SampledDeviation(Struct, frozen=True, eq=False):
     """Offsets sampled on one road-following segment."""
 
-    distance: FloatArray
-    """Shape (n,). Distance driven at each sample, strictly increasing; n >= 2. [m]"""
-    deviation: FloatArray
-    """Shape (n,). Sampled offset, positive left. [m]"""
+    distance: FloatArray  # driven at each sample, strictly increasing, shape (n,), n >= 2 [m]
+    deviation: FloatArray  # sampled offset, positive left, shape (n,) [m]
     settling: tuple[float, float]
     """Distances before the first and after the last sample within which lateral movement may settle. [m]"""
 
@@ -248,10 +228,8 @@ class SampledDeviation(Struct, frozen=True, eq=False):
 class Deviation(Struct, frozen=True, eq=False):
     """Deviation from nominal motion, twice continuously differentiable in the distance driven."""
 
-    splines: tuple[NaturalSpline, ...]
-    """One per sampled segment, in order of distance."""
-    settling: tuple[tuple[float, float], ...]
-    """As in `SampledDeviation`."""
+    splines: tuple[NaturalSpline, ...]  # one per sampled segment, in order of distance
+    settling: tuple[tuple[float, float], ...]  # as in `SampledDeviation`
 
     def __call__(self, distance: FloatArray) -> FloatArray:
         """Evaluate at distances driven, shape (n,). [m]"""
@@ -316,10 +294,7 @@ def smoother_step(u: FloatArray) -> FloatArray:
 def settle(
     distance: FloatArray, reach: float | FloatArray, slope: float | FloatArray, bend: float | FloatArray
 ) -> FloatArray:
-    """Quintic Hermite functions: starts with value 0, the given slope and second derivative; all three 0 at `reach`.
-
-    Shape (n,) as the distances, in units of the slope times theirs.
-    """
+    """Quintic Hermite function: value 0, slope and second derivative at 0 as given; all three 0 at `reach`."""
     if np.all(np.asarray(reach) <= 0.0):
         return np.zeros_like(distance)
     u = np.clip(distance / reach, 0.0, 1.0)

@@ -61,7 +61,11 @@ def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
         edges = list(zip(outline, outline[1:] + outline[:1], strict=True))
         for point in points:
             for start, end in edges:
-                best = min(best, _to_edge(point, start, end))
+                ux, uy = end[0] - start[0], end[1] - start[1]
+                length = ux * ux + uy * uy
+                u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
+                u = min(max(u, 0.0), 1.0)
+                best = min(best, hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy))
     return best
 
 
@@ -73,14 +77,6 @@ def holds_point(box: tuple[Point, ...], point: Point) -> bool:
         if not 0.0 <= along <= ux * ux + uy * uy:
             return False
     return True
-
-
-def _to_edge(point: Point, start: Point, end: Point) -> float:
-    ux, uy = end[0] - start[0], end[1] - start[1]
-    length = ux * ux + uy * uy
-    u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
-    u = min(max(u, 0.0), 1.0)
-    return hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy)
 
 
 def gaps(shape_: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from xosc_lateral.world.player import boxes
 from xosc_lateral.world.player.drive import drawn_by
 from xosc_lateral.world.player.paths.base import nearest_s
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
+from xosc_lateral.world.road.lanes import lanes_between
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadPath
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
@@ -114,11 +115,8 @@ def _gap_between(state: EntityState, here: Spot, spot: Spot, limit: float) -> Ro
     if path is None:
         return None
     lane = _lane_there(state.network, here, path)
-    opposite = lane * spot.lane < 0
-    lanes = spot.lane - lane
-    if opposite:
-        lanes -= 1 if lanes > 0 else -1
-    return RoadGap(path.ds, _across(here, spot, path), lanes, opposite, path.is_turned)
+    across, lanes = _across(here, spot, path), lanes_between(lane, spot.lane)
+    return RoadGap(path.ds, across, lanes, lane * spot.lane < 0, path.is_turned)
 
 
 def _path_between(state: EntityState, here: Spot, spot: Spot, limit: float = UNREACHABLE_DISTANCE) -> RoadPath | None:

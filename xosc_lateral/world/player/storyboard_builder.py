@@ -26,24 +26,14 @@ from xosc_lateral.world.player.storyboard import (
     RunningTrigger,
     StoryboardElement,
 )
+from xosc_lateral.world.scenario import scenario as read
 from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.position import reference_of
 from xosc_lateral.world.scenario.private_actions import TeleportAction
-from xosc_lateral.world.scenario.scenario import (
-    Act,
-    Action,
-    Condition,
-    Event,
-    Init,
-    ManeuverGroup,
-    Private,
-    Storyboard,
-    Trigger,
-)
 
 
-def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> StoryboardElement:
+def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> StoryboardElement:
     """The tree of the storyboard; conditions that watch an element have found it."""
     stories = [
         StoryboardElement(story.name, StoryboardElementType.STORY, [_act(act, simulation) for act in story.acts])
@@ -57,7 +47,7 @@ def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> Storyboa
     return root
 
 
-def init_actions(init: Init, simulation: Simulation) -> list[RunningAction]:
+def init_actions(init: read.Init, simulation: Simulation) -> list[RunningAction]:
     """Init actions in the order in which they start: an entity that is placed relative to another comes after it."""
     actions = [
         prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
@@ -68,7 +58,7 @@ def init_actions(init: Init, simulation: Simulation) -> list[RunningAction]:
     return actions
 
 
-def _in_order(privates: tuple[Private, ...]) -> Iterator[Private]:
+def _in_order(privates: tuple[read.Private, ...]) -> Iterator[read.Private]:
     waiting = list(privates)
     placed: set[str] = set()
     names = {private.entity_ref for private in privates}
@@ -85,7 +75,7 @@ def _in_order(privates: tuple[Private, ...]) -> Iterator[Private]:
         yield chosen
 
 
-def _references(private: Private) -> set[str]:
+def _references(private: read.Private) -> set[str]:
     names = (
         reference_of(action.content.position)
         for action in private.actions
@@ -94,7 +84,7 @@ def _references(private: Private) -> set[str]:
     return {name for name in names if name is not None}
 
 
-def _act(act: Act, simulation: Simulation) -> StoryboardElement:
+def _act(act: read.Act, simulation: Simulation) -> StoryboardElement:
     return StoryboardElement(
         act.name,
         StoryboardElementType.ACT,
@@ -104,7 +94,7 @@ def _act(act: Act, simulation: Simulation) -> StoryboardElement:
     )
 
 
-def _group(group: ManeuverGroup, simulation: Simulation) -> StoryboardElement:
+def _group(group: read.ManeuverGroup, simulation: Simulation) -> StoryboardElement:
     if group.actors.select_triggering_entities:
         simulation.note("the triggering entities do not join the actors", group.actors.place)
     maneuvers = [
@@ -119,7 +109,7 @@ def _group(group: ManeuverGroup, simulation: Simulation) -> StoryboardElement:
     return StoryboardElement(group.name, kind, maneuvers, maximum_count=count)
 
 
-def _event(event: Event, group: ManeuverGroup, simulation: Simulation) -> EventElement:
+def _event(event: read.Event, group: read.ManeuverGroup, simulation: Simulation) -> EventElement:
     return EventElement(
         event.name,
         StoryboardElementType.EVENT,
@@ -130,7 +120,7 @@ def _event(event: Event, group: ManeuverGroup, simulation: Simulation) -> EventE
     )
 
 
-def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> Iterator[RunningAction]:
+def _actions(action: read.Action, group: read.ManeuverGroup, simulation: Simulation) -> Iterator[RunningAction]:
     """One action for each actor, or one for all when it is not private."""
     if not action.is_private:
         yield prepare_action(action, None, simulation)
@@ -154,7 +144,7 @@ RUNNING: dict[type, Maker] = {
 }
 
 
-def prepare_action(action: Action, actor: EntityState | None, simulation: Simulation) -> RunningAction:
+def prepare_action(action: read.Action, actor: EntityState | None, simulation: Simulation) -> RunningAction:
     """An action as an element of the storyboard, ready to be started."""
     return RUNNING[type(action.content)](action, actor, simulation)
 
@@ -166,7 +156,9 @@ ENTITY_CHECKS: EntityChecks = {
 VALUE_CHECKS: Checks = dict(value.CHECKS)
 
 
-def _trigger(trigger: Trigger | None, simulation: Simulation, *, when_empty: bool = False) -> RunningTrigger | None:
+def _trigger(
+    trigger: read.Trigger | None, simulation: Simulation, *, when_empty: bool = False
+) -> RunningTrigger | None:
     """A trigger ready to be evaluated frame by frame."""
     if trigger is None:
         return None
@@ -177,7 +169,7 @@ def _trigger(trigger: Trigger | None, simulation: Simulation, *, when_empty: boo
     return RunningTrigger(tuple(groups), when_empty=when_empty)
 
 
-def _check(condition: Condition, simulation: Simulation) -> Check:
+def _check(condition: read.Condition, simulation: Simulation) -> Check:
     content = condition.content
     if isinstance(content, Unsupported):
         simulation.note(content.reason or f"{content.kind} can't be played: the condition stays false", content.place)

@@ -140,10 +140,6 @@ class Line(Struct, frozen=True):
         """Zero. [1/m]"""
         return 0.0
 
-    def pieces(self) -> tuple[ClothoidPiece, ...]:
-        """The line as clothoid pieces."""
-        return clothoid_pieces(self.x, self.y, self.heading, self.length, 0.0, 0.0)
-
 
 class Arc(Struct, frozen=True):
     """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
@@ -165,10 +161,6 @@ class Arc(Struct, frozen=True):
     def curvature_at(self, ds: float) -> float:
         """Constant. [1/m]"""
         return self.curvature
-
-    def pieces(self) -> tuple[ClothoidPiece, ...]:
-        """The arc as clothoid pieces."""
-        return clothoid_pieces(self.x, self.y, self.heading, self.length, self.curvature, 0.0)
 
 
 class Spiral(Struct, frozen=True):
@@ -205,10 +197,6 @@ class Spiral(Struct, frozen=True):
     def curvature_at(self, ds: float) -> float:
         """Linear in ds. [1/m]"""
         return self.curvature + self.sharpness * ds
-
-    def pieces(self) -> tuple[ClothoidPiece, ...]:
-        """The clothoid's pieces."""
-        return self.parts
 
 
 class ParamCubic(Struct, frozen=True):
@@ -250,3 +238,11 @@ class ParamCubic(Struct, frozen=True):
 
 
 ReferenceElement = Line | Arc | Spiral | ParamCubic
+
+
+def pieces_of(element: Line | Arc | Spiral) -> tuple[ClothoidPiece, ...]:
+    """All but a parametric cubic as clothoid pieces."""
+    if isinstance(element, Spiral):
+        return element.parts
+    x, y, heading, length = element.x, element.y, element.heading, element.length
+    return clothoid_pieces(x, y, heading, length, element.curvature_at(0.0), 0.0)

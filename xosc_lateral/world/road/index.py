@@ -137,7 +137,8 @@ class SurfaceIndex(NetworkTables):
             )
         wanted = self._wanted[types]
         section = np.broadcast_to(np.asarray(self.section_numbers(road, feet.s)), feet.s.shape)
-        first, count = self._section_first[section], self._section_count[section]
+        first = self._section_first[section]
+        count = self._section_first[section + 1] - first - 1
         row = np.full(len(feet.s), -1, dtype=np.int32)
         centre, width = np.zeros(len(feet.s)), np.zeros(len(feet.s))
         lowest, closest = np.full(len(feet.s), np.inf), np.full(len(feet.s), np.inf)

@@ -36,7 +36,7 @@ class LaneTables:
     """Roads, lane sections and lanes of a network as flat arrays.
 
     Lane rows: all lanes of all sections, lane 0 included, in one list; `_row_of` turns (section, lane id) into a row.
-    The lanes of a section but lane 0 are the `_section_count` rows from `_section_first` on, from left to right.
+    The rows of a section begin at its `_section_first`: its lanes from left to right, lane 0 the last.
     """
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
@@ -48,13 +48,11 @@ class LaneTables:
         self._lanes: list[Lane] = [lane for section in sections for lane in (*section.lanes, section.centre)]
         ids = [lane.id for lane in self._lanes]
         self._lowest = min(ids, default=0)  # a file may hold no road at all
-        self._slots = max(ids, default=0) - self._lowest + 1
-        self._section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
-        lanes = self._section_count + 1  # lane 0 is the last of its section
-        self._section_first = np.cumsum(lanes, dtype=np.intp) - lanes
-        self._rows = np.full(len(sections) * self._slots, -1, dtype=np.intp)
-        slot = np.repeat(np.arange(len(sections)), lanes) * self._slots + np.array(ids, dtype=np.intp) - self._lowest
-        self._rows[slot] = np.arange(len(ids))
+        counts = np.array([0, *(len(section.by_id) for section in sections)], dtype=np.intp)
+        self._section_first = np.cumsum(counts)
+        self._rows = np.full((len(sections), max(ids, default=0) - self._lowest + 1), -1, dtype=np.intp)
+        slot = np.array(ids, dtype=np.intp) - self._lowest
+        self._rows[np.repeat(np.arange(len(sections)), counts[1:]), slot] = np.arange(len(ids))
         self._lane_ids = np.array(ids, dtype=np.int32)
         self._lane_directions = np.array([lane.direction for lane in self._lanes], dtype=np.int32)
         self._lane_lookup = Lookup([lane.starts for lane in self._lanes])
@@ -70,10 +68,10 @@ class LaneTables:
         """Row in the lane table; raises `PlaybackError` for the first lane that is not there. Shape as `s` [m]."""
         section = self.section_numbers(road, s)
         slot = lane - self._lowest
-        outside = (slot < 0) | (slot >= self._slots)
+        outside = (slot < 0) | (slot >= self._rows.shape[1])
         if np.any(outside):
             self._complain(road, lane, s, outside)
-        row = self._rows[section * self._slots + slot]
+        row = self._rows[section, slot]
         if np.any(row < 0):
             self._complain(road, lane, s, row < 0)
         return int(row) if np.ndim(row) == 0 else row
@@ -133,10 +131,10 @@ class LaneTables:
         return index.astype(np.int32), count.astype(np.int32)
 
     def _section_index(self, section: int, rows: Int32Array, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        first, n = int(self._section_first[section]), int(self._section_count[section])
+        first, end = self._section_first[section : section + 2].tolist()
         direction = self._lane_directions[rows]
         index, count, is_driving = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s), dtype=bool)
-        for row in range(first, first + n):
+        for row in range(first, end - 1):
             if self._lanes[row].type not in DRIVING:
                 continue
             itself = rows == row

@@ -39,6 +39,12 @@ def beside(lane: int, lanes: int) -> int:
     return target
 
 
+def lanes_between(lane: int, other: int) -> int:
+    """How many lanes further along +t another one is, lane 0 not counted: undoes `beside`."""
+    lanes = other - lane
+    return lanes - (1 if lanes > 0 else -1) if lane * other < 0 else lanes
+
+
 class LaneFacts(Struct, frozen=True):
     """What a file says about a lane and what needs no evaluation; s is that of the road, not of the section."""
 

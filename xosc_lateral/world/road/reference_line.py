@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.world.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
+from xosc_lateral.world.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic, pieces_of
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
 from xosc_lateral.world.road.road import Road
 
@@ -54,7 +54,7 @@ class ReferenceLines:
                         pieces.append((curvatures[-1], True, len(cubics)))
                         cubics.append((*parameter, *element.x, *element.y))
                 else:
-                    for piece in element.pieces():
+                    for piece in pieces_of(element):
                         curvatures.append(start + piece.start)
                         pieces.append((start + piece.middle, False, len(clothoids)))
                         clothoids.append(piece)

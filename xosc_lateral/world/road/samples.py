@@ -44,7 +44,14 @@ class Samples:
 
     def __init__(self, tables: NetworkTables, lane_types: Collection[str] | None) -> None:
         """Lay samples over the lanes, and list for each cell those in it and around it."""
-        parts = [part for i in range(len(tables.roads)) for part in _road_samples(tables, i, lane_types)]
+        parts = []  # road, s, x, y
+        for i, road in enumerate(tables.roads):
+            for section in road.sections:
+                lanes = [lane for lane in section.lanes if lane_types is None or lane.type in lane_types]
+                if lanes and section.end > section.start:
+                    s, t = _grid(tables, i, section, lanes)
+                    poses = tables.road_to_world(i, s, t)
+                    parts.append((i, s.ravel(), poses.x.ravel(), poses.y.ravel()))
         if not parts:
             raise PlaybackError(f"no road has a lane of these types: {', '.join(sorted(lane_types or ('any',)))}")
         self.road = np.concatenate([np.full(len(s), road, dtype=np.int32) for road, s, _, _ in parts])
@@ -125,21 +132,6 @@ class Samples:
         point_number = np.cumsum(new_point) - 1
         keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + SAMPLE_REACH]
         return Candidates(point[keep], self.road[sample[keep]], self.s[sample[keep]])
-
-
-def _road_samples(
-    tables: NetworkTables, index: int, lane_types: Collection[str] | None
-) -> list[tuple[int, FloatArray, FloatArray, FloatArray]]:
-    """Samples of one road, section by section: (road, s, x, y)."""
-    parts = []
-    for section in tables.roads[index].sections:
-        lanes = [lane for lane in section.lanes if lane_types is None or lane.type in lane_types]
-        if not lanes or section.end <= section.start:
-            continue
-        s, t = _grid(tables, index, section, lanes)
-        poses = tables.road_to_world(index, s, t)
-        parts.append((index, s.ravel(), poses.x.ravel(), poses.y.ravel()))
-    return parts
 
 
 def _grid(

@@ -89,8 +89,6 @@ class NetworkTables(LaneTables):
         self._superelevation = Cubics([road.surface.superelevation for road in roads])
         self._is_shaped = np.array([bool(r.surface.crossfall or r.surface.shape) for r in roads])
         self._heights = HeightTable(self._lanes)
-        self._level = bool(self._superelevation.is_zero and not self._is_shaped.any())
-        self._flat = bool(self._elevation.is_zero and self._level)
 
     # ---- poses -------------------------------------------------------------------------------------------------------
     def lane_to_world(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
@@ -143,8 +141,16 @@ class NetworkTables(LaneTables):
         surface = self._surface(road, s, t, self._elevation.at(road, s))
         _, pitch, roll, _, drift, _ = surface
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
-        if profile is not None:
-            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
+        if profile is not None:  # as the lane's traffic goes: turned by its slope, and round where it runs against s
+            if profile.slope.any():
+                turn = np.arctan(profile.slope)
+                if pitch.any() or roll.any():
+                    turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+                heading = heading + turn
+            backwards = profile.direction < 0
+            if np.any(backwards):
+                heading = heading + np.pi * backwards
+                pitch, roll = pitch * profile.direction, roll * profile.direction
         # into [-pi, pi]
         heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
         return *self._point(frame, surface, s, t, profile), heading, pitch, roll
@@ -173,10 +179,11 @@ class NetworkTables(LaneTables):
     ) -> _Lie:
         """What `Surface.at` answers, by elevation and slope; without `angles` height, shrinking and lead alone."""
         nothing = np.zeros(len(s))
-        if self._flat:
+        is_level = self._superelevation.is_zero and not self._is_shaped.any()
+        if is_level and self._elevation.is_zero:
             return nothing, nothing, nothing, None, None, None
         height, grade = rising
-        if self._level:
+        if is_level:
             return height, -np.arctan(grade) if angles else nothing, nothing, None, None, None
         angle, twist = self._superelevation.at(road, s)
         shrink, rise = np.cos(angle), np.sin(angle)
@@ -269,22 +276,6 @@ class NetworkTables(LaneTables):
 
         crossfall, grade = self._batch(evaluate, 2, road, s, lane=lane)
         return crossfall, grade
-
-
-def _along_lane(
-    profile: LaneProfile, heading: FloatArray, pitch: FloatArray, roll: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """As the lane's traffic goes: turned by its slope, and round where it runs against s. [rad]"""
-    if profile.slope.any():
-        turn = np.arctan(profile.slope)
-        if pitch.any() or roll.any():
-            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-        heading = heading + turn
-    backwards = profile.direction < 0
-    if np.any(backwards):
-        heading = heading + np.pi * backwards
-        pitch, roll = pitch * profile.direction, roll * profile.direction
-    return heading, pitch, roll
 
 
 def turned_in_surface(

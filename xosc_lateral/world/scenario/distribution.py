@@ -96,7 +96,6 @@ class Draw(Protocol):
 
     def draw(self, rng: np.random.Generator) -> str:
         """One value as text."""
-        ...
 
 
 class Limits(Struct, frozen=True):

@@ -76,8 +76,9 @@ class Entity(Struct, frozen=True):
     performance: Performance = Performance()  # vehicles only; else without limits
     axles: Axles | None = None  # vehicles only
     controllers: tuple[Controller, ...] = ()  # assigned at the start
-    object_name: str = ""  # name of the Vehicle, Pedestrian or MiscObject (often its catalog entry)
-    kind: str = ""  # the file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects
+    object_name: Annotated[str, called("name")] = ""  # of the Vehicle, Pedestrian or MiscObject (often a catalog entry)
+    kind: Annotated[str, called("vehicleCategory", "pedestrianCategory", "miscObjectCategory")] = ""
+    """The file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects."""
     trailer: str | None = None  # name of the entity that it pulls from the start
     hitch_x: float | None = None
     coupler_x: float | None = None

@@ -15,7 +15,7 @@ from xosc_lateral.world.scenario.position import Position
 class EnvironmentAction(Content, frozen=True):
     """Set the environment; parts that are None stay as they are."""
 
-    environment: Environment
+    environment: Annotated[Environment, called("")]
 
 
 class ModifyOperation(StrEnum):

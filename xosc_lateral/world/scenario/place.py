@@ -46,14 +46,15 @@ class Xml(Struct, frozen=True):
     """
 
     names: tuple[str, ...] = ()
-    """Attributes, or child elements, of which the first that is there counts; ``Sun/azimuth`` is in a child element. An
-    empty tuple where the name is the usual one, ``("",)`` for the element itself."""
+    """Attributes, or child elements, of which the first that is there counts; ``Sun/azimuth`` is in a child element,
+    ``*`` the first of any. An empty tuple where the name is the usual one, ``("",)`` for the element itself."""
     default: object = UNSET
     """What is read where it is missing, if the field itself has no default: lenient reading, not the standard."""
     finite: bool = True  # infinity is refused
     is_entity: bool = False
     """The name of an entity that has to be there; of a tuple, those that EntityRef elements stand for."""
     is_parameter: bool = False  # the name of a parameter, which files also write with a ``$``
+    is_road: bool = False  # the id of a road
 
 
 def called(*names: str, default: object = UNSET) -> Xml:
@@ -64,6 +65,7 @@ def called(*names: str, default: object = UNSET) -> Xml:
 EntityRef = Annotated[str, Xml(is_entity=True)]
 EntityRefs = Annotated[tuple[str, ...], Xml(is_entity=True)]
 ParameterRef = Annotated[str, Xml(is_parameter=True)]
+RoadId = Annotated[str, Xml(is_road=True)]
 AnyNumber = Annotated[float, Xml(finite=False)]
 """May be infinite."""
 Zero = Annotated[float, Xml(default=0.0)]

@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Struct
 
 from xosc_lateral.world.scenario.enums import ReferenceContext, RouteStrategy
-from xosc_lateral.world.scenario.place import Content, EntityRef, Name, No, Unsupported, Xml, Zero, called
+from xosc_lateral.world.scenario.place import Content, EntityRef, Name, No, RoadId, Unsupported, Xml, Zero, called
 
 
 class Orientation(Struct, frozen=True):
@@ -56,7 +56,7 @@ class RelativeObjectPosition(Content, frozen=True):
 class RoadPosition(Content, frozen=True):
     """Road coordinates. [m]"""
 
-    road_id: str
+    road_id: RoadId
     s: float
     t: Zero
     orientation: Orientation | None = None
@@ -74,7 +74,7 @@ class RelativeRoadPosition(Content, frozen=True):
 class LanePosition(Content, frozen=True):
     """Lane coordinates; `offset` along +t as the standard has it. [m]"""
 
-    road_id: str
+    road_id: RoadId
     lane_id: int
     s: float
     offset: float = 0.0

@@ -256,8 +256,8 @@ class VisibilityAction(Content, frozen=True):
 class LightStateAction(Content, frozen=True):
     """A light goes on, off, or flashes."""
 
-    light: str
-    mode: str
+    light: Annotated[str, called("LightType/*/vehicleLightType", "LightType/*/userDefinedLightType", default="")]
+    mode: Annotated[str, called("LightState/mode", default="")]
     transition_time: float = 0.0
 
 

@@ -162,7 +162,10 @@ class Around:
         np.fmin.at(self.oncoming, rows[k], gap[k] - INFLUENCE_DISTANCE * np.log(share[k]))
         np.maximum.at(self.oncoming_there, rows[k], share[k])
         for side, middle in ZONES.items():
-            share = _share_inside(seen.left / width - middle, other_width / width)
+            # of a body, that lies in the lane, of what fits in
+            body, centre = other_width / width, seen.left / width - middle
+            inside = np.minimum(centre + 0.5 * body, 0.5) - np.maximum(centre - 0.5 * body, -0.5)
+            share = np.clip(inside / np.minimum(body, 1.0), 0.0, 1.0)
             share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
             k = np.flatnonzero(share)
             if len(k):
@@ -213,12 +216,6 @@ class _Side:
     def is_truck(self) -> FloatArray:
         """How far who is there is a truck, others weighed by their influence."""
         return self.of_trucks / np.where(self.influence > 0, self.influence, 1.0)
-
-
-def _share_inside(middle: FloatArray, width: FloatArray) -> FloatArray:
-    """Share of a body that lies in a lane one wide, of what fits in; `middle` from the lane's, all in lane widths."""
-    inside = np.minimum(middle + 0.5 * width, 0.5) - np.maximum(middle - 0.5 * width, -0.5)
-    return np.clip(inside / np.minimum(width, 1.0), 0.0, 1.0)
 
 
 def smooth_step(u: FloatArray) -> FloatArray:

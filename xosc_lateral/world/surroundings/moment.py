@@ -22,27 +22,21 @@ class Roads(Protocol):
 
     def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
         """Context columns of places on lanes, shape (n,) each, as `surroundings.context.road_columns` has them."""
-        ...
 
     def section(self, road: int, lane: int, s: float) -> float:
         """Where the lane section begins that a place is in: places of one section share a path. [m]"""
-        ...
 
     def path(self, road: int, lane: int, s: float) -> list[around.Reach]:
         """Lane sections within reach along the lane, both ways."""
-        ...
 
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
         """+1 where a lane is driven along s, -1 against it, shape (n,). [-]"""
-        ...
 
     def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
         """Lateral coordinate t on the road of places so far from their lanes' centres, shape (n,). [m]"""
-        ...
 
     def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
         """The same of one lane's centre, shape (n,). [m]"""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,7 @@ import pytest
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.held_out import removal_of
-from xosc_lateral.drivers.loop.model import Removal
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.column import columns_on_size, of_kind, shrunk
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
@@ -59,10 +58,9 @@ def test_a_term_matches_one_of_its_kind_and_columns(coarse: Coarse) -> None:
     assert not StepTerm(at=100).matches(StepTerm(at=400))
 
 
-def test_nothing_is_removed_before_a_term_says_so() -> None:
-    removal = Removal(np.full(4, 0.2))
-    for part in (removal.spread, removal.fine):
-        np.testing.assert_array_equal(part, np.zeros(4))
+def test_nothing_is_removed_before_a_term_says_so(coarse: Coarse) -> None:
+    for part in removal_of(fit_model(coarse, ())).values():
+        np.testing.assert_array_equal(part, np.zeros(len(coarse.timeline)))
 
 
 # ---- column terms ----------------------------------------------------------------------------------------------------
@@ -121,5 +119,5 @@ def test_terms_of_one_component_are_numbered_and_what_they_did_adds_up(coarse: C
     assert list(estimates) == ["mean 0", "mean 1", "spread 0"]
     removal = removal_of(fitted)
     parts = [effects[0].strength(0.2, coarse.context) for key, (_, effects) in estimates.items() if "mean" in key]
-    np.testing.assert_allclose(removal.location, parts[0] + parts[1], atol=1e-15)  # type: ignore[operator]
-    np.testing.assert_array_equal(removal.spread, estimates["spread 0"][1][0].strength(0.2, coarse.context))
+    np.testing.assert_allclose(removal[Acts.LOCATION], parts[0] + parts[1], atol=1e-15)  # type: ignore[operator]
+    np.testing.assert_array_equal(removal[Acts.SPREAD], estimates["spread 0"][1][0].strength(0.2, coarse.context))

@@ -11,8 +11,7 @@ from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.passage import BEFORE_S, typical_passage
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Selection, select
-from xosc_lateral.drivers.loop.terms.course import CourseTerm
-from xosc_lateral.drivers.loop.terms.mean import MeanTerm
+from xosc_lateral.drivers.loop.terms.mean import CourseTerm, MeanTerm
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, Linear
 

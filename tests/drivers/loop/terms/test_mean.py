@@ -8,7 +8,7 @@ from msgspec import structs
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.loop.dictionary import beside, respond_by_second
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import fit_model
 from xosc_lateral.drivers.loop.terms.mean import NEAR_SCALES, MeanTerm, _profile, _shapes, widening
 from xosc_lateral.drivers.model.effects import Acts, Factor, Form, Linear, Product
 from xosc_lateral.drivers.model.effects.response import respond

@@ -7,9 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.kit.coarse import SPREAD, coarse_of, movement, wander
-from xosc_lateral.drivers.loop import regression
-from xosc_lateral.drivers.loop.model import Fitted
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop import model
+from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
 from xosc_lateral.drivers.loop.terms.spread import (
@@ -89,7 +88,7 @@ def test_metres_or_centimetres_are_the_same_factor(monkeypatch: pytest.MonkeyPat
     own = movement(np.random.default_rng(12), SECONDS) * np.exp(LOG_SIZE * x)
     sizes = []
     for factor in (1.0, 100.0):
-        monkeypatch.setattr(regression, "MEASUREMENT_NOISE", 0.03 * factor)
+        monkeypatch.setattr(model, "MEASUREMENT_NOISE", 0.03 * factor)
         fitted = fit_model(coarse_of(factor * own, {"x": x}), (term(SpreadTerm),))
         sizes.append(estimate(fitted)[0].coefficients[0])
     assert sizes[0] == pytest.approx(sizes[1], rel=1e-5)

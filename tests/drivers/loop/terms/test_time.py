@@ -20,8 +20,7 @@ from xosc_lateral.drivers.loop.low_frequencies import (
     mean_probability,
     smooth_probabilities,
 )
-from xosc_lateral.drivers.loop.model import Fitted, Removal
-from xosc_lateral.drivers.loop.regression import fit_model
+from xosc_lateral.drivers.loop.model import Fitted, fit_model
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised_cosines
 from xosc_lateral.drivers.loop.timeline import Coarse
@@ -130,13 +129,12 @@ def test_what_is_removed_is_what_the_profile_gets() -> None:
     fitted = fitted_with(TimeMeanTerm(4), 0.3 * np.exp(-3.0 * SHARE) + movement(rng, SECONDS))
     term, timeline = fitted.terms[0], fitted.coarse.timeline
     effects = term.estimate(fitted)  # type: ignore[attr-defined]
-    removal = Removal(np.zeros(len(timeline)))
-    term.remove(fitted, effects, removal)  # type: ignore[attr-defined]
+    ((acts, removed),) = term.removed(fitted, effects)  # type: ignore[attr-defined]
     inside = timeline.valid
     sampled = whole_terms(effects[0], timeline.time, {}, rng).location
-    np.testing.assert_allclose(np.diff(removal.location[inside]), np.diff(sampled[inside]), atol=1e-12)
-    assert removal.location[inside].mean() == pytest.approx(0.0, abs=1e-9)
-    assert (removal.spread == 0.0).all()
+    np.testing.assert_allclose(np.diff(removed[inside]), np.diff(sampled[inside]), atol=1e-12)
+    assert removed[inside].mean() == pytest.approx(0.0, abs=1e-9)
+    assert acts == "location"
 
 
 def test_mirrored_drives_have_mirrored_smooths() -> None:

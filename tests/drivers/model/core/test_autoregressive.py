@@ -167,7 +167,7 @@ def test_sampled_drives_have_the_simulated_drivers_spectrum(measured: Autoregres
 
 def movement_by_band(rel_offset: np.ndarray, timeline: Timeline) -> np.ndarray:
     """Logarithm of the standard deviation: of the offset, then of its movement slower than 60, 20, 8, 3 s in bands."""
-    levels = [local_mean(rel_offset, timeline.valid, seconds, timeline.step) for seconds in (3.0, 8.0, 20.0, 60.0)]
+    levels = [local_mean(rel_offset, timeline.valid, seconds) for seconds in (3.0, 8.0, 20.0, 60.0)]
     bands = [rel_offset, levels[3], levels[2] - levels[3], levels[1] - levels[2], levels[0] - levels[1]]
     return np.array([np.log(band[timeline.valid].std()) for band in bands])
 

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy import signal, stats
 
-from xosc_lateral.base.shipped import shipped_folder
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.drivers.model.core.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,

@@ -122,8 +122,7 @@ class _Places:
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
-        """Weights at which the weighed squares add up to their degrees of freedom (Paule, Mandel 1982), by Newton's
-        method."""
+        """Weights at which weighed squares add up to their degrees of freedom (Paule, Mandel 1982), by Newton."""
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power

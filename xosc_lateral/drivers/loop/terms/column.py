@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.loop.model import Description, Fitted, Removal, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear, Piecewise, Saturating, Threshold
@@ -40,12 +40,9 @@ class ColumnTerm(Term):
         """A term of an effect that may act on something else."""
         return cls(structs.replace(effect, acts=cls.acts), alike)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
-        """Evaluate the sized effects."""
-        for effect in effects:
-            assert isinstance(effect, ColumnEffect)
-            part = {Acts.LOCATION: removal.location, Acts.SPREAD: removal.spread, Acts.FINE: removal.fine}[effect.acts]
-            part += fitted.coarse.strength(effect)
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
+        """What the sized effects do."""
+        return [(own.acts, fitted.coarse.strength(own)) for own in effects if isinstance(own, ColumnEffect)]
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
         """What it does."""
@@ -73,8 +70,7 @@ class ColumnTerm(Term):
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest response that counts: all seen, for a shift; 5 % and 95 % quantile for a factor. Shape
-        (k,) each."""
+        """Lowest and highest response that counts, shape (k,): of all for a shift, 5 % and 95 % for a factor."""
         response = coarse.response(self.effect, keep=True)[coarse.valid]
         least, most = response.min(axis=0), response.max(axis=0)
         if self.acts is Acts.LOCATION:
@@ -121,8 +117,7 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """The 5 % and 95 % quantile, or extremes if they are one, of column, product or strength: as quantities, shape (k,)
-    each."""
+    """Quantity, shape (k,), at the 5 % and 95 % quantile of column, product or strength, or its extremes."""
     inside = coarse.timeline.valid
     if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
         seen = coarse.context[effect.column][inside]

@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -22,7 +23,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import Search, beside
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
 from xosc_lateral.drivers.loop.terms.spread import (
     SLOW_S,
@@ -35,7 +36,7 @@ from xosc_lateral.drivers.loop.terms.spread import (
     what_columns_do,
 )
 from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
-from xosc_lateral.drivers.model.effects import Effect, Regimes
+from xosc_lateral.drivers.model.effects import Acts, Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
 
 
@@ -159,13 +160,12 @@ class RegimesTerm(Term):
         lengths = {"on_s": self.fit.on_s, "off_s": self.fit.off_s}
         return (Regimes(factor=factor, factor_error=error, fine_factor=float(np.exp(fine)), **lengths),)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """By the probability that the loud regime is on."""
         effect = effects[0]
         assert isinstance(effect, Regimes)
         on = on_fine_grid(self.fit.on, fitted.coarse.timeline)
-        removal.spread += on * np.log(effect.factor)
-        removal.fine += on * np.log(effect.fine_factor)
+        return [(Acts.SPREAD, on * np.log(effect.factor)), (Acts.FINE, on * np.log(effect.fine_factor))]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor and mean lengths."""
@@ -179,8 +179,7 @@ class RegimesTerm(Term):
 def probability_of_persistence(
     squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
 ) -> float:
-    """Probability that loudness of at most `CLUSTER_S`, without what is `known` to go with it, shows as much
-    persistence."""
+    """Probability that loudness of `CLUSTER_S` at most, beside what is `known`, persists as much."""
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = beside(basis, squares)

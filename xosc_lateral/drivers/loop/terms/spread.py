@@ -87,8 +87,7 @@ def what_columns_do(search: Search, fitted: Fitted) -> FloatArray:
 
 
 def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
-    """What the best other column may do to the movement's size, shape (n, k), and its p-value: hidden changes stand
-    beside it."""
+    """What the best other column may do to the movement's size, shape (n, k), and its p-value."""
     return ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
 
 
@@ -228,8 +227,7 @@ def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), and standard errors, shape (k,)
-    each."""
+    """Log-linear regression [1]_ of a standard deviation on columns, shape (n, k), and its errors, shape (k,)."""
     design = columns[squares.valid] - columns[squares.valid].mean(axis=0)
     inverse = np.linalg.pinv(2.0 * design.T @ design)
     sizes = np.zeros(columns.shape[1])

@@ -11,6 +11,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -18,7 +19,6 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.loop.candidates import Family
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.low_frequencies import (
     MEAN_SHORTEST_S,
@@ -31,14 +31,14 @@ from xosc_lateral.drivers.loop.low_frequencies import (
     low_frequencies,
     mean_probability,
     moment_of,
+    penalised,
     slow_rows,
     smooth_probabilities,
     step_moments,
     without_known,
 )
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Removal, Stage, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
-from xosc_lateral.drivers.loop.regression import fit_model
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
@@ -53,7 +53,7 @@ from xosc_lateral.drivers.loop.terms.spread import (
     what_columns_do,
 )
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
-from xosc_lateral.drivers.model.effects import Effect, Step, TimeSmooth
+from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
 
 STEP_PARAMETERS = 2  # Of a step: its height and its moment.
@@ -186,10 +186,10 @@ class TimeMeanTerm(_MeanByTime):
         assert isinstance(effects[0], TimeSmooth)
         return effects[0].path(effects[0].location, coarse.timeline.time)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """As the profile has it."""
         path = self.quantity(fitted.coarse, effects)
-        removal.location += path - path[fitted.coarse.timeline.valid].mean()
+        return [(Acts.LOCATION, path - path[fitted.coarse.timeline.valid].mean())]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between its extremes, in the order of time."""
@@ -282,11 +282,11 @@ class TimeSpreadTerm(Term):
         assert isinstance(effects[0], TimeSmooth)
         return effects[0].path(effects[0].spread, coarse.timeline.time)
 
-    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+    def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """A plain function of time."""
         assert isinstance(effects[0], TimeSmooth)
-        removal.spread += self.quantity(fitted.coarse, effects)
-        removal.fine += effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
+        fine = effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
+        return [(Acts.SPREAD, self.quantity(fitted.coarse, effects)), (Acts.FINE, fine)]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor between its extremes, in the order of time."""
@@ -312,8 +312,7 @@ def _priced(fitted: Fitted, term: Term, parameters: int) -> float:
 
 def _columns_as_likely(search: Search, fitted: Fitted, kind: type[ColumnTerm], by_time: float) -> Alternatives:
     """Columns that as they are explain about as much as time does, whose priced likelihood is `by_time`."""
-    plain = (one for one in search.quantities.candidates if one.family is Family.PLAIN and len(one.contrast) == 1)
-    terms = (kind.of(structs.replace(one.effect, response_s=1.0)) for one in plain)
+    terms = (kind.of(structs.replace(one.effect, response_s=1.0)) for one in search.plain_candidates())
     return tuple(dict.fromkeys(term.columns for term in terms if _priced(fitted, term, 1) > by_time - AS_LIKELY))
 
 
@@ -321,21 +320,6 @@ def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatA
     """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand."""
     estimates, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
     return estimates, np.sqrt(np.diag(known))
-
-
-def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, shape (k,), given how they vary beforehand but for a scale, that of restricted maximum likelihood, and
-    covariance."""
-    largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))
-    best, scaled_prior = -np.inf, np.zeros_like(prior)
-    for scale in largest * np.geomspace(1e-6, 10.0, 60):
-        total = covariance + scale * prior
-        sign, volume = np.linalg.slogdet(total)
-        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
-        if likelihood > best:
-            best, scaled_prior = likelihood, scale * prior
-    gain = np.linalg.solve(covariance + scaled_prior, scaled_prior).T
-    return gain @ sizes, gain @ covariance
 
 
 def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:

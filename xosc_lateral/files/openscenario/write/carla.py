@@ -68,10 +68,7 @@ def start_of(item: Moving) -> tuple[build.Pose, float]:
 
 
 def add_drives(act: etree._Element, name: str, item: Moving, draft: Draft) -> None:
-    """Add a maneuver with an event for every drive of an entity: from where it is placed to where it is placed anew.
-
-    Without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
-    """
+    """Add a maneuver with an event per drive: from where an entity is placed to where it is placed anew; no pitch."""
     maneuver = build.maneuver(act, name, item.name)
     for number, pieces in enumerate(_drives(item.pieces), start=1):
         name = f"{item.name} trajectory {number}"
@@ -85,12 +82,12 @@ def add_drives(act: etree._Element, name: str, item: Moving, draft: Draft) -> No
         if not draft.scenario.header.is_left_handed:
             columns[4] = np.zeros_like(columns[4])
         columns = [times, *columns[:3], wrapped(columns[3]), *columns[4:]]
-        vertices = TimedVertices(len(times), partial(_of_block, columns))
+        vertices = TimedVertices(len(times), partial(_of_rows, columns))
         add_vertices(build.private_action(event, name), name, draft, vertices)
         build.time_trigger(event, "StartTrigger", begin, VERSION)
 
 
-def _of_block(columns: Sequence[FloatArray], part: slice) -> list[FloatArray]:
+def _of_rows(columns: Sequence[FloatArray], part: slice) -> list[FloatArray]:
     return [values[part] for values in columns]
 
 
@@ -210,18 +207,14 @@ def _entities(losses: Losses, scenario: Scenario, converted: Sequence[str]) -> N
             )
         elif entity.name in converted:
             losses.note(f"'{entity.name}': ScenarioRunner does not move a {entity.category.value}")
-    egos = [name for name, vehicle in vehicles.items() if _is_ego(vehicle)]
-    if not egos and vehicles:
+    properties = (item for vehicle in vehicles.values() for item in vehicle.iter("{*}Property"))
+    if vehicles and _EGO not in ((item.get("name"), item.get("value")) for item in properties):
         chosen = next((name for name in vehicles if name.lower() in ("ego", "hero")), next(iter(vehicles)))
-        properties = vehicles[chosen].find("{*}Properties")
-        assert properties is not None  # asked for by version 1.0
-        for old in [old for old in properties if old.get("name") == _EGO[0]]:
+        owner = vehicles[chosen].find("{*}Properties")
+        assert owner is not None  # asked for by version 1.0
+        for old in [old for old in owner if old.get("name") == _EGO[0]]:
             remove(old)
-        properties.insert(0, etree.Element("Property", {"name": _EGO[0], "value": _EGO[1]}))
-
-
-def _is_ego(vehicle: etree._Element) -> bool:
-    return any((item.get("name"), item.get("value")) == _EGO for item in vehicle.iter("{*}Property"))
+        owner.insert(0, etree.Element("Property", {"name": _EGO[0], "value": _EGO[1]}))
 
 
 def _usual_vehicle(entity: Entity) -> etree._Element:
@@ -249,13 +242,9 @@ def _assign_controls(root: etree._Element, entities: Sequence[Entity]) -> None:
     for owner in root.iter("{*}Private"):
         if owner.get("entityRef") in names:
             names.remove(str(owner.get("entityRef")))
-            build.insert_indented(owner, len(owner), _control())
-
-
-def _control() -> etree._Element:
-    action = etree.Element("PrivateAction")
-    both = build.sub(action, "ControllerAction")
-    controller = build.sub(both, "AssignControllerAction/Controller", name=CONTROL)
-    build.sub(controller, "Properties/Property", name="module", value=CONTROL)
-    add_missing_overrides(both)
-    return action
+            action = etree.Element("PrivateAction")
+            both = build.sub(action, "ControllerAction")
+            controller = build.sub(both, "AssignControllerAction/Controller", name=CONTROL)
+            build.sub(controller, "Properties/Property", name="module", value=CONTROL)
+            add_missing_overrides(both)
+            build.insert_indented(owner, len(owner), action)

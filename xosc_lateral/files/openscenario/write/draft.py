@@ -35,14 +35,12 @@ class Player(StrEnum):
 
 
 class TargetPlayer(Struct, frozen=True):
-    """Player and version; `ValueError` for a version that can't be written, or that the player does not read."""
+    """Player and version; `ValueError` for a version that the player does not read."""
 
     player: Player = Player.STANDARD
     version: Version | None = None  # (1, 0) to (1, 4). Without: the input's own, or the only one that the player reads.
 
     def __post_init__(self) -> None:
-        if self.version is not None and self.version not in VERSIONS:
-            raise ValueError(f"version {named(self.version)} can't be written; {_VERSION_LIST} can")
         if self.player is Player.CARLA and self.version not in (None, (1, 0)):
             raise ValueError("CARLA's ScenarioRunner reads version 1.0 alone")
 
@@ -60,28 +58,22 @@ STANDARD = TargetPlayer()
 
 def target(player: str = Player.STANDARD.value, version: str | None = None) -> TargetPlayer:
     """From a user's words: a player's name, and a version such as "1.2"; `ValueError` for words that are neither."""
-    if version is None:
-        return TargetPlayer(Player(player))
     known = {named(one): one for one in VERSIONS}
-    if version not in known:
-        raise ValueError(f"version {version!r} can't be written; {_VERSION_LIST} can")
-    return TargetPlayer(Player(player), known[version])
-
-
-_VERSION_LIST = ", ".join(named(one) for one in VERSIONS)
+    if version is not None and version not in known:
+        raise ValueError(f"version {version!r} can't be written; {', '.join(known)} can")
+    return TargetPlayer(Player(player), None if version is None else known[version])
 
 
 class Draft:
-    """The scenario's tree, changed step by step into the output's.
-
-    The bytes of the scenario are the starting point, so that comments, catalogs and vendor extensions survive. Raises
-    `FormatError` for a scenario that was converted before, `PlaybackError` for a run of 0 s.
-    """
+    """A scenario's tree, changed into the output's; `FormatError`: converted before; `PlaybackError`: a run of 0 s."""
 
     def __init__(self, scenario: Scenario, motion: NominalMotion, target: TargetPlayer = STANDARD) -> None:
         self.scenario, self.motion, self.player = scenario, motion, target.player
         self.root = parse_xml(scenario.source, scenario.path)
         refuse_converted(self.root, scenario.path)
+        board = child_of(self.root, "Storyboard")
+        assert board is not None
+        self.storyboard = board
         if motion.end_time <= 0.0:
             trigger = scenario.storyboard.stop_trigger
             place = scenario.storyboard.place if trigger is None else trigger.place
@@ -97,13 +89,6 @@ class Draft:
         """Controllers and actions that are no longer in the output although they are no motion, with reasons."""
         self.notes: list[str] = []
         """What else there is to say of the output, a line each."""
-
-    @property
-    def storyboard(self) -> etree._Element:
-        """In the tree."""
-        board = child_of(self.root, "Storyboard")
-        assert board is not None
-        return board
 
     @property
     def init_actions(self) -> etree._Element:

@@ -40,37 +40,15 @@ def write_converted(
 ) -> WrittenScenario:
     """Write a scenario in which entities follow trajectories, or keep their maneuvers and get lane offsets on top.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
-    motion : NominalMotion
-        The run: gives the times of kept actions, standstill, teleports, and the end; how often an action runs.
-    trajectories : mapping of str to WorldTrajectory
-        Per entity, on the rows of `motion`. Trailers follow whoever pulls them: theirs are ignored in a replay.
-    output : path
-    chains : sequence of OffsetChain, optional
-        One for each entity with lane offsets from its start, and one for each of its lateral actions: the scenario
-        stays reactive. Without: a replay, in which all that is no trajectory happens when it happened in the run.
-    lateral : LateralActions, optional
-        Those of the scenario, where they are known.
-    provenance : mapping
-        JSON values: goes into the file as it is.
-    summary : str
-        A few words of it for the file header's description.
-    save : bool
-        Write it; else the bytes are only handed back.
-    target : TargetPlayer
-        Player and version that it is made for.
+    - `motion`: the run; gives the times of kept actions, standstill, teleports and the end; how often an action runs
+    - `trajectories`: per entity, on the rows of `motion`; those of trailers are ignored in a replay
+    - `chains`: of those who get lane offsets, from their start and after each lateral action: the scenario stays
+      reactive. None: a replay, in which all that is no trajectory happens when it happened in the run
+    - `lateral`: actions of the scenario, where they are known; `provenance`: JSON values
+    - `summary`: of the provenance, for the header's description; `save`: else the bytes are only handed back
 
-    Raises
-    ------
-    FormatError
-        The scenario was converted before, or can't be expressed for the target.
-    OSError
-        The output can't be written; nothing is left half-written.
-    ValueError
-        A trajectory holds NaN or does not fit the motion.
+    Raises `FormatError`: it was converted before, or can't be expressed for the target; `OSError`: nothing is left
+    half-written; `ValueError`: a trajectory holds NaN or does not fit the motion.
     """
     draft = Draft(scenario, motion, target)
     if chains is None:
@@ -86,10 +64,7 @@ def write_converted(
 
 
 def _fit(draft: Draft, converted: Sequence[str], *, is_reactive: bool) -> None:
-    """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without.
-
-    Its file references are still as seen from the scenario.
-    """
+    """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without."""
     scenario = draft.scenario
     losses = Losses(draft.root, scenario.path, f"version {named(draft.version)}", is_reactive, draft.notes)
     if draft.is_adapted:
@@ -111,14 +86,14 @@ _REFERENCES = {"Directory": "path"} | dict.fromkeys(("LogicFile", "SceneGraphFil
 
 
 def rewrite_paths(draft: Draft, output: Path) -> None:
-    """Rewrite relative file references so that they lead from the output's folder to where they led before.
-
-    Nothing changes when the output lies beside the input, but for the road and a catalog that the reader found
-    elsewhere than written: their references are repaired.
-    """
+    """Rewrite relative file references: they lead where they led before; a road found elsewhere is repaired."""
     scenario = draft.scenario
     old, new = _absolute(scenario.path).parent, _absolute(output).parent
-    found_elsewhere = _catalogs_found_elsewhere(scenario)
+    # Folders of catalogs that lie in none of the scenario's catalog locations.
+    known = [_absolute(path) for path in scenario.catalog_locations.values()]
+    known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
+    folders = dict.fromkeys(_absolute(path).parent for path in scenario.input_files[1:])
+    found_elsewhere = [folder for folder in folders if folder not in known]
     for element in elements(draft.root):
         tag = local_name(element)
         attribute = _REFERENCES.get(tag, "model3d")
@@ -140,14 +115,6 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
         stays = old == new or Path(text).is_absolute() or text[1:2] == ":"
         if text and not (target == leads_to and stays):
             element.set(attribute, Path(os.path.relpath(target, new)).as_posix())
-
-
-def _catalogs_found_elsewhere(scenario: Scenario) -> list[Path]:
-    """Folders of catalogs that lie in none of the scenario's catalog locations."""
-    known = [_absolute(path) for path in scenario.catalog_locations.values()]
-    known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
-    folders = dict.fromkeys(_absolute(path).parent for path in scenario.input_files[1:])
-    return [folder for folder in folders if folder not in known]
 
 
 def _absolute(path: Path) -> Path:

@@ -198,10 +198,7 @@ class _Acts:
         _add_speed(group, self._chain.entity, HALTING_SPEED, "falling")
 
     def _add_stop(self, act: etree._Element, name: str) -> None:
-        """By any lateral action that runs.
-
-        A condition that is looked at for the first time sees all that was before; the second one is true only later.
-        """
+        """By any lateral action that runs; the second condition is true later than what was before its first look."""
         trigger = None
         for item in self._items:
             if (item.path == self._chain.after and not item.repeats) or item.adds:
@@ -303,13 +300,8 @@ def _reference(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) 
 def _names(scenario: Scenario) -> Iterator[str]:
     """Name of every element of the storyboard."""
     for story in scenario.storyboard.stories:
-        yield story.name
-        for act in story.acts:
-            yield act.name
-            for group in act.maneuver_groups:
-                yield group.name
-                for maneuver in group.maneuvers:
-                    yield maneuver.name
-                    for event in maneuver.events:
-                        yield event.name
-                        yield from (action.name for action in event.actions)
+        yield from (story.name, *(act.name for act in story.acts))
+    for _, _, group in scenario.storyboard.groups():
+        yield from (group.name, *(maneuver.name for maneuver in group.maneuvers))
+        for _, event in group.events():
+            yield from (event.name, *(action.name for action in event.actions))

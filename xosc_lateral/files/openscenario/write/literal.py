@@ -32,10 +32,7 @@ def in_scope(item: etree._Element, path: Path, scope: Scope) -> Iterator[tuple[e
 
 
 def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
-    """Write values in place of expressions and, if wanted, of parameters; declarations stay.
-
-    Raises `FormatError` for one that has no value.
-    """
+    """Values in place of expressions and, if wanted, of parameters; `FormatError` for one that has no value."""
     for item, within in in_scope(losses.root, losses.path, scope):
         for name, value in item.attrib.items():
             text = str(value)
@@ -47,11 +44,7 @@ def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
 
 
 def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Collection[str]) -> None:
-    """Storyboard elements and references to them by their names, if one that is wanted is named by an expression.
-
-    Conditions elsewhere refer to such an element by its value; who looks at the file alone would find no element of
-    that name.
-    """
+    """Storyboard elements and references to them by their names, if a wanted one is named by an expression."""
     attributes: list[tuple[etree._Element, str, str]] = []
     for storyboard in elements(root, "Storyboard"):
         for item, within in in_scope(storyboard, path, scope):
@@ -66,10 +59,7 @@ def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Colle
 
 
 def inline_catalogs(losses: Losses, draft: Draft) -> None:
-    """Entries in place of references to catalogs, which are files of the input's version; then no catalog is named.
-
-    Only catalogs that the reader took something from are looked at. What can't be found stays, and is noted.
-    """
+    """Entries in place of references to catalogs, of the input's version; what is not found stays, and is noted."""
     missing = set()
     for _ in range(_MAXIMUM_CATALOG_DEPTH):
         references = [reference for reference in _references(draft) if reference.xml not in missing]
@@ -90,10 +80,7 @@ def inline_catalogs(losses: Losses, draft: Draft) -> None:
 
 
 def inline_maneuvers(draft: Draft, wanted: Collection[str]) -> None:
-    """Maneuvers of catalogs that hold an element of a wanted name, in place of the references to them.
-
-    Who looks at the file alone would find no element of that name.
-    """
+    """Catalog maneuvers that hold an element of a wanted name, in place of their references: who looks finds it."""
     for reference in _references(draft):
         if local_name(parent_of(reference.xml)) != "ManeuverGroup":
             continue

@@ -34,9 +34,8 @@ class Losses:
     root: etree._Element  # changed in place
     path: Path  # of the scenario, for errors
     target: str  # what lacks things, as in ``version 1.0``
+    # reactive: maneuvers and conditions still decide on what happens: those can't be taken out, and events stay
     reactive: bool
-    """Maneuvers and conditions still decide on what happens: those can't be taken out, and events stay for others to
-    refer to."""
     notes: list[str] = field(default_factory=list)  # a line each, in order, once
 
     def note(self, text: str) -> None:

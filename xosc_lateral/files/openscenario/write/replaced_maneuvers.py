@@ -19,9 +19,7 @@ from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectories
 from xosc_lateral.files.openscenario.write.replay import (
     add_kept_actions,
-    dropped_reason,
-    is_replaced,
-    note_dropped,
+    kept_actions,
     remove_controllers,
     rewrite_init,
 )
@@ -31,7 +29,7 @@ from xosc_lateral.world.scenario.dependence import refers_to
 from xosc_lateral.world.scenario.enums import StoryboardElementState
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.world.scenario.private_actions import ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, actors_of, conditions_of
+from xosc_lateral.world.scenario.scenario import Act, Condition, ManeuverGroup, Scenario, conditions_of
 
 STORY = "xosc-lateral trajectories"
 UNREACHED_TIME = 1e9
@@ -62,15 +60,12 @@ class Group(Struct, frozen=True):
 
     def element_of(self, content: StoryboardElementStateCondition) -> Path | None:
         """What a condition is about, if that is in the group or around it."""
-        return next((path for path in self._elements() if refers_to(content, path)), None)
-
-    def _elements(self) -> Iterator[Path]:
-        """The story, the act and the group, and all that is in the group."""
-        yield from (self.path[:1], self.path[:2], self.path)
-        yield from ((*self.path, maneuver.name) for maneuver in self.group.maneuvers)
+        paths = [self.path[:1], self.path[:2], self.path]
+        paths += [(*self.path, maneuver.name) for maneuver in self.group.maneuvers]
         for maneuver, event in self.group.events():
             path = (*self.path, maneuver.name, event.name)
-            yield from (path, *((*path, action.name) for action in event.actions))
+            paths += [path, *((*path, action.name) for action in event.actions)]
+        return next((path for path in paths if refers_to(content, path)), None)
 
 
 def groups_of(scenario: Scenario) -> list[Group]:
@@ -112,15 +107,14 @@ def separable(scenario: Scenario, wanted: Collection[str]) -> frozenset[str]:
 
 def _coupled(scenario: Scenario) -> set[str]:
     names = {name for entity in scenario.entities if entity.trailer for name in (entity.name, entity.trailer)}
-    for member in groups_of(scenario):
-        for _, event in member.group.events():
-            if member.group.actors.select_triggering_entities:
-                names |= set(actors_of(member.act, member.group, event))
-            for action in event.actions:
-                if isinstance(action.content, AddEntityAction | DeleteEntityAction):
-                    names.add(action.content.entity_ref)
-                elif isinstance(action.content, ConnectTrailerAction):
-                    names |= {action.content.trailer_ref, *member.actors}
+    for at in scenario.storyboard.events():
+        if at.group.actors.select_triggering_entities:
+            names |= set(at.actors)
+        for content in (action.content for action in at.event.actions):
+            if isinstance(content, AddEntityAction | DeleteEntityAction):
+                names.add(content.entity_ref)
+            elif isinstance(content, ConnectTrailerAction):
+                names |= {content.trailer_ref, *at.group.actors.entity_refs}
     return names
 
 
@@ -171,13 +165,14 @@ class ReplacedManeuvers:
         if not self._moving:
             return
         remove_controllers(self._draft, self._moving)
-        theirs = [played for played in self._draft.motion.actions if self._is_theirs(played)]
-        note_dropped(self._draft, theirs)
+        actions = self._draft.motion.actions
+        theirs = (one for one in actions if one.path[:3] in self._gone or one.actor in self._moving)
+        kept = kept_actions(self._draft, theirs, self._moving)
         notes = [note for note in map(self._freeze, self._frozen) if note]
         self._draft.notes += dict.fromkeys(notes)
         rewrite_init(self._draft, {name: item.start for name, item in self._moving.items()})
         self._take_out()
-        self._put_in([played for played in theirs if self._is_kept(played)])
+        self._put_in(kept)
 
     def _freeze(self, frozen: tuple[StoryboardElementStateCondition, etree._Element, Path]) -> str:
         content, element, path = frozen
@@ -217,14 +212,6 @@ class ReplacedManeuvers:
             build.time_trigger(act, "StartTrigger", 0.0, self._draft.version)
         if len(story):
             self._draft.put_last(story)
-
-    def _is_theirs(self, played: PlayedAction) -> bool:
-        return played.path[:3] in self._gone or played.actor in self._moving
-
-    def _is_kept(self, played: PlayedAction) -> bool:
-        if played.path == ("Init",) or is_replaced(played.action, played.actor, self._moving):
-            return False
-        return dropped_reason(played.action, self._draft.scenario) is None
 
 
 def _remove(element: etree._Element, kinds: tuple[str, ...]) -> None:

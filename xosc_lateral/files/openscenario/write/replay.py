@@ -26,45 +26,31 @@ from xosc_lateral.world.scenario.global_actions import AddEntityAction, Paramete
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION, ConnectTrailerAction
-from xosc_lateral.world.scenario.scenario import Action, Scenario, conditions_of
+from xosc_lateral.world.scenario.scenario import Scenario, conditions_of
 
 _REPLACED_TAGS = {kind.__name__ for kind in MOTION + CONTROLLER}
 
 
 def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
-    """Take the controllers off entities that follow trajectories: they would drive them elsewhere."""
-    note_controllers(draft, converted)
-    for entity in draft.scenario.entities:
-        if entity.name not in converted or not entity.controllers:
-            continue
-        item = at_node(draft.root, entity.place.node)
-        if local_name(item) != "ScenarioObject":
-            continue  # described in a catalog
-        for owner in item.findall("{*}ObjectController"):
-            item.remove(owner)
-
-
-def note_controllers(draft: Draft, converted: Collection[str]) -> None:
-    """Once for each entity: what drove it, and no longer does."""
+    """Take the controllers off entities that follow trajectories, and name them: they would drive them elsewhere."""
     driving, assigned = controlled_entities(draft.scenario), assigned_controllers(draft.scenario)
     for entity in draft.scenario.entities:
         if entity.name not in converted:
             continue
-        names = ", ".join(dict.fromkeys(map(named, assigned[entity.name])))
+        what = ", ".join(dict.fromkeys(map(named, assigned[entity.name]))) + ", which was never active"
         if control := driving.get(entity.name):
-            reason = f"'{entity.name}' follows a trajectory: controller {control}; now as the default driver would"
-        elif names:
-            reason = f"'{entity.name}' follows a trajectory: controller {names}, which was never active"
-        else:
-            continue
-        draft.removed.append(Unsupported("ObjectController", entity.place, reason))
+            what = f"{control}; now as the default driver would"
+        if control or assigned[entity.name]:
+            reason = f"'{entity.name}' follows a trajectory: controller {what}"
+            draft.removed.append(Unsupported("ObjectController", entity.place, reason))
+        item = at_node(draft.root, entity.place.node)
+        if entity.controllers and local_name(item) == "ScenarioObject":  # else described in a catalog
+            for owner in item.findall("{*}ObjectController"):
+                item.remove(owner)
 
 
 def rewrite_init(draft: Draft, starts: Mapping[str, tuple[build.Pose, float] | None]) -> None:
-    """Replace what moves the converted entities in init by a place and a speed; lights, visibility and others stay.
-
-    A start of None leaves init as it is: the entity is not there at the start.
-    """
+    """A place and a speed in place of what moves entities in init; a start of None (not there yet) changes nothing."""
     actions = draft.init_actions
     done: set[str] = set()
     # The reader's order is the file's: names need no parameters filled in again.
@@ -111,19 +97,28 @@ def _prune(element: etree._Element) -> None:
 
 
 # ---- actions that are no motion: copied out of the source, to happen when they were played ----
-def is_replaced(action: Action, actor: str | None, converted: Collection[str]) -> bool:
-    """Whether a written trajectory stands for this action."""
-    return actor in converted and isinstance(action.content, MOTION + CONTROLLER)
+def kept_actions(draft: Draft, played: Iterable[PlayedAction], moving: Collection[str]) -> list[PlayedAction]:
+    """Those of events that no trajectory stands for, in the order of the run; those that can't be kept are named."""
+    kept: list[PlayedAction] = []
+    dropped: dict[tuple[Place, str | None], Unsupported] = {}
+    for item in played:
+        content, place = item.action.content, item.action.place
+        if item.path == ("Init",):
+            continue
+        is_set = isinstance(content, ParameterSetAction | ParameterModifyAction)
+        if is_set and content.parameter_ref not in draft.scenario.parameters:
+            reason = f"sets parameter '{content.parameter_ref}' of a story that is no longer there"
+            dropped[place, item.actor] = Unsupported(type(content).__name__, place, reason)
+        elif item.actor not in moving or not isinstance(content, MOTION + CONTROLLER):
+            kept.append(item)
+    draft.removed += dropped.values()
+    return kept
 
 
 def add_kept_actions(
     story: etree._Element, name: str, draft: Draft, played: Sequence[PlayedAction], poses: Mapping[int, build.Pose]
 ) -> None:
-    """Add an act with one event for each action that is not replaced, in the order of the run; none for no actions.
-
-    Each run of actions with the same actor has a maneuver group, so that the order holds across actors, too.
-    `poses`: of an AddEntityAction, by index in `played`: where the entity appears on its written path.
-    """
+    """Add an act with an event per action, in order, a group for each run of an actor's; `poses`: of those added."""
     if not played:
         return
     act = build.sub(story, "Act", name=name)
@@ -146,27 +141,6 @@ def add_kept_actions(
     build.time_trigger(act, "StartTrigger", 0.0, draft.version)
 
 
-def dropped_reason(action: Action, scenario: Scenario) -> str | None:
-    """Why an action that is no motion can't be kept; None if it can."""
-    content = action.content
-    if isinstance(content, ParameterSetAction | ParameterModifyAction) and (
-        content.parameter_ref not in scenario.parameters
-    ):
-        return f"sets parameter '{content.parameter_ref}' of a story that is no longer there"
-    return None
-
-
-def note_dropped(draft: Draft, played: Iterable[PlayedAction]) -> None:
-    """Name the actions that are neither motion nor kept, with reasons, each place once."""
-    unsupported: dict[tuple[Place, str | None], Unsupported] = {}
-    for item in played:
-        reason = dropped_reason(item.action, draft.scenario) if item.path != ("Init",) else None
-        if reason is not None:
-            place = item.action.place
-            unsupported[place, item.actor] = Unsupported(type(item.action.content).__name__, place, reason)
-    draft.removed += unsupported.values()
-
-
 def _copied(source: etree._Element, mine: Mapping[str, str], scope: Scope) -> etree._Element:
     """Copy with the parameters of story, maneuver and catalog filled in; global ones stay parameters."""
     element = copy.deepcopy(source)
@@ -181,7 +155,7 @@ def _copied(source: etree._Element, mine: Mapping[str, str], scope: Scope) -> et
     return element
 
 
-# ---- Write a played scenario with trajectories in place of its ma ----
+# ---- all maneuvers gone ----
 STORY = "xosc-lateral"
 TRAILERS_SINCE = (1, 3)
 """Version from which a trailer follows whoever pulls it; in older ones it is an entity like others."""
@@ -194,12 +168,12 @@ def replay(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> tuple[s
     alone = draft.is_adapted and draft.version < TRAILERS_SINCE
     pulled = set() if alone else pulled_entities(draft.scenario, draft.motion)
     moving = moving_entities(draft, {name: path for name, path in trajectories.items() if name not in pulled})
-    note_dropped(draft, draft.motion.actions)
+    kept = kept_actions(draft, draft.motion.actions, moving)
     remove_controllers(draft, moving)
     for_carla = draft.player is Player.CARLA
     rewrite_init(draft, {name: start_of(item) if for_carla else item.start for name, item in moving.items()})
     index = _take_away(draft.storyboard)
-    story = _new_story(draft, moving)
+    story = _new_story(draft, kept, moving)
     if len(story):
         build.insert_indented(draft.storyboard, index, story)
     _replace_stop_trigger(draft)
@@ -227,9 +201,8 @@ def _take_away(storyboard: etree._Element) -> int:
     return index
 
 
-def _new_story(draft: Draft, moving: Mapping[str, Moving]) -> etree._Element:
+def _new_story(draft: Draft, kept: Sequence[PlayedAction], moving: Mapping[str, Moving]) -> etree._Element:
     story = build.story(STORY)
-    kept = [played for played in draft.motion.actions if _is_kept(played, draft.scenario, moving)]
     # Before the trajectories: an entity has to be there before it moves.
     poses = {
         index: moving[content.entity_ref].pose_after(played.start)
@@ -248,12 +221,6 @@ def _new_story(draft: Draft, moving: Mapping[str, Moving]) -> etree._Element:
             build.maneuver_group(act, f"{STORY} nothing", None)
         build.time_trigger(act, "StartTrigger", 0.0, draft.version)
     return story
-
-
-def _is_kept(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:
-    """Actions of init stay where they are."""
-    is_motion = is_replaced(played.action, played.actor, moving)
-    return not (played.path == ("Init",) or is_motion or dropped_reason(played.action, scenario))
 
 
 def _replace_stop_trigger(draft: Draft) -> None:

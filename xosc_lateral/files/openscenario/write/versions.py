@@ -42,12 +42,11 @@ def additions(minor: int, kind: str) -> Mapping[str, Any]:
 
 
 def fit_version(losses: Losses, source: Version, version: Version) -> None:
-    """Make a scenario one of another version; parts that were made for it are left as they are.
-
-    Raises `FormatError`: a condition or, if the scenario is reactive, a maneuver that the version does not know.
-    """
-    _orientations(losses.root, source, version)
-    if version[1] >= _STRICT_SINCE_MINOR:
+    """Make a scenario one of another version; `FormatError` for a condition or a reactive maneuver that it lacks."""
+    was_strict, is_strict = (one[1] >= _STRICT_SINCE_MINOR for one in (source, version))
+    for item in elements(losses.root, "Orientation") if was_strict != is_strict else ():
+        item.set("type", item.get("type") or ("relative" if was_strict else "absolute"))  # what it meant without
+    if is_strict:
         _be_strict(losses)
     for minor in range(NEWEST_MINOR, version[1], -1):
         _take_back(losses, minor)
@@ -107,15 +106,6 @@ def _write_older_value(losses: Losses, item: etree._Element, name: str) -> None:
         losses.action(item, f"{losses.target} has no {name} '{value}'")
 
 
-def _orientations(root: etree._Element, source: Version, version: Version) -> None:
-    """Say what an orientation without a type meant, where that changes."""
-    if (source[1] >= _STRICT_SINCE_MINOR) == (version[1] >= _STRICT_SINCE_MINOR):
-        return
-    meant = "relative" if source[1] >= _STRICT_SINCE_MINOR else "absolute"
-    for item in elements(root, "Orientation"):
-        item.set("type", item.get("type") or meant)
-
-
 def _be_strict(losses: Losses) -> None:
     """One action in an action: a controller assigned and its values overridden are two; an empty one is none."""
     for item in elements(losses.root, "ControllerAction"):
@@ -136,18 +126,14 @@ def _split_controller_action(item: etree._Element) -> None:
     for part in inactive:
         remove(part)
     for part in [part for part in parts if part not in inactive][1:]:
+        # Into a controller action of its own, right after the one that it was in.
         item.remove(part)
-        _move_out(part, parent_of(item))
-
-
-def _move_out(part: etree._Element, private: etree._Element) -> None:
-    """Into a controller action of its own, right after the one that it was in."""
-    after = another = private
-    if local_name(parent_of(private)) == "Action":
-        after = parent_of(private)
-        another = etree.Element("Action", {"name": f"{after.get('name')} {local_name(part)}"})
-        build.sub(another, "PrivateAction/ControllerAction").append(part)
-    else:
+        after = parent_of(item)
         another = etree.Element("PrivateAction")
-        build.sub(another, "ControllerAction").append(part)
-    build.insert_after(after, another)
+        holder = another
+        if local_name(parent_of(after)) == "Action":
+            after = parent_of(after)
+            another = etree.Element("Action", {"name": f"{after.get('name')} {local_name(part)}"})
+            holder = build.sub(another, "PrivateAction")
+        build.sub(holder, "ControllerAction").append(part)
+        build.insert_after(after, another)

@@ -153,11 +153,8 @@ class RunningSynchronize(RunningPrivateAction):
             if time_left >= 2.0 * distance / max(final, EPSILON):
                 return 0.0
             self._mode = SpeedPhase.LINE
-        if (
-            self._mode is SpeedPhase.TO_APEX
-            and time_left < UNREACHABLE_DISTANCE
-            and self._is_on_line(final, distance, time_left)
-        ):
+        to_line = abs(state.speed - (2.0 * distance / time_left - final)) if time_left < UNREACHABLE_DISTANCE else inf
+        if self._mode is SpeedPhase.TO_APEX and to_line < SAME_SPEED:
             self._mode = SpeedPhase.LINE
             return state.speed
         if self._mode is SpeedPhase.LINE:
@@ -166,9 +163,6 @@ class RunningSynchronize(RunningPrivateAction):
             self._mode = SpeedPhase.TO_APEX
             self._rushes = 0.5 * (final + state.speed) < distance / time_left
         return self._to_apex(final, distance, time_left, step)
-
-    def _is_on_line(self, final: float, distance: float, time_left: float) -> bool:
-        return abs(self.actor.speed - (2.0 * distance / time_left - final)) < SAME_SPEED
 
     def _to_apex(self, final: float, s: float, t: float, step: float) -> float:
         state = self.actor

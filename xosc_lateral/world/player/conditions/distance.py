@@ -18,7 +18,7 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.player.values import holds
-from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.lanes import DRIVING, lanes_between
 from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
@@ -186,17 +186,12 @@ def prepare_relative_clearance(content: conditions.RelativeClearanceCondition, s
             return False
         return any(
             info.type in DRIVING
-            and in_range(_lanes_between(state.lane, info.id))
+            and in_range(lanes_between(state.lane, info.id))
             and (content.opposite_lanes or info.id * state.lane > 0)
             for info in simulation.network.lanes_at(state.road, state.s)
         )
 
     return check
-
-
-def _lanes_between(lane: int, other: int) -> int:
-    difference = other - lane
-    return difference - (1 if difference > 0 else -1) if lane * other < 0 else difference
 
 
 CHECKS: EntityChecks = {

@@ -72,14 +72,6 @@ def _project(settings: dict[str, str], latitude: float, longitude: float) -> tup
     return x + float(settings.get("x_0", "0")), y - y_0 + float(settings.get("y_0", "0"))
 
 
-def _conformal_tangent(latitude: float) -> float:
-    """Tangent of the conformal latitude (Karney, eqs. 7-9)."""
-    e = sqrt(_FLATTENING * (2.0 - _FLATTENING))
-    tau = tan(latitude)
-    sigma = sinh(e * atanh(e * tau / hypot(1.0, tau)))
-    return tau * hypot(1.0, sigma) - sigma * hypot(1.0, tau)
-
-
 def _transverse(latitude: float, longitude: float, k: float) -> tuple[float, float]:
     n = _FLATTENING / (2.0 - _FLATTENING)
     a = _RADIUS / (1.0 + n) * (1.0 + n**2 / 4.0 + n**4 / 64.0 + n**6 / 256.0)
@@ -91,7 +83,9 @@ def _transverse(latitude: float, longitude: float, k: float) -> tuple[float, flo
         34729 * n**5 / 80640 - 3418889 * n**6 / 1995840,
         212378941 * n**6 / 319334400,
     )
-    tau = _conformal_tangent(latitude)
+    e, tau = sqrt(_FLATTENING * (2.0 - _FLATTENING)), tan(latitude)
+    sigma = sinh(e * atanh(e * tau / hypot(1.0, tau)))
+    tau = tau * hypot(1.0, sigma) - sigma * hypot(1.0, tau)  # of the conformal latitude (Karney, eqs. 7-9)
     xi = atan2(tau, cos(longitude))
     eta = asinh(sin(longitude) / hypot(tau, cos(longitude)))
     north = xi + sum(c * sin(2 * j * xi) * cosh(2 * j * eta) for j, c in enumerate(alpha, 1))
