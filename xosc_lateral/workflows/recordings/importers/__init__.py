@@ -33,6 +33,7 @@ from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
+Sources: TypeAlias = Path | Sequence[Path]
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
 
@@ -163,7 +164,7 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
     return ImportedDrives(table, record)
 
 
-def paths_of(sources: Path | Sequence[Path]) -> list[Path]:
+def paths_of(sources: Sources) -> list[Path]:
     """One or several."""
     return [sources] if isinstance(sources, Path) else list(sources)
 
@@ -193,7 +194,7 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
     that names it, never in a table of nonsense."""
 
     @wraps(read)
-    def within(source: Path | Sequence[Path], *args: Any, keep_cut: bool = False, **settings: Any) -> ImportedDrives:
+    def within(source: Sources, *args: Any, keep_cut: bool = False, **settings: Any) -> ImportedDrives:
         path = paths_of(source)[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:

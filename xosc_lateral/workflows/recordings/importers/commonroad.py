@@ -10,7 +10,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import (
     LaneShape,
@@ -37,7 +36,7 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 
 
 @importer
-def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
+def import_commonroad(sources: Sources, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
     """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
 
     def read(path: Path, label: str) -> ImportedDrives:

@@ -41,7 +41,7 @@ from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, fa
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -95,11 +95,7 @@ class Channel:
 
 @importer
 def import_mf4(
-    sources: Path | Sequence[Path],
-    channels: Sequence[str] = (),
-    *,
-    step: float = 0.04,
-    mapping: MappingLike | None = None,
+    sources: Sources, channels: Sequence[str] = (), *, step: float = 0.04, mapping: MappingLike | None = None
 ) -> ImportedDrives:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
 
@@ -271,10 +267,11 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
     sides = ("lane_width",) if "lane_width" in signals else POSITIONS[1]
     width = sum(float(np.median(signals[name].values)) for name in sides)
-    columns: dict[str, NDArray[Any]] = {}
-    for name, channel in signals.items():
-        broken = channel.breaks(JUMP * width if name in position and name != "lane_width" else np.inf)
-        columns[name] = channel.at(time, broken, is_position=name in position)
+    jumps = {name: JUMP * width for name in position if name != "lane_width"}
+    columns = {
+        name: channel.at(time, channel.breaks(jumps.get(name, np.inf)), is_position=name in position)
+        for name, channel in signals.items()
+    }
     unknown = np.any([np.isnan(columns[name]) for name in position], axis=0)
     if "distance_left" in position:  # one side has jumped, the other not yet
         unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width

@@ -34,7 +34,7 @@ from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, imported, importer, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -59,7 +59,7 @@ HEADER_LINES = 50  # lines before the header, at most: the campaign's files have
 
 
 @importer
-def import_openacc(source: Path | Sequence[Path], *, lane_width: float = LANE_WIDTH) -> ImportedDrives:
+def import_openacc(source: Sources, *, lane_width: float = LANE_WIDTH) -> ImportedDrives:
     """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
     paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]
@@ -67,8 +67,7 @@ def import_openacc(source: Path | Sequence[Path], *, lane_width: float = LANE_WI
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
     frames = []
     for side in (1.0, -1.0):  # counter-clockwise, clockwise: two lanes
-        same = [car for car in cars if car.turn == side]
-        if same:
+        if same := [car for car in cars if car.turn == side]:
             frames += _placed(same, _centre_line(same), lane_width)
     table = pd.concat(frames, ignore_index=True)
     note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"

@@ -10,7 +10,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import (
     Strip,
     graph_of_shapes,
@@ -41,7 +41,7 @@ HOST = "host"  # stands for the trace's own host vehicle
 
 @importer
 def import_osi(
-    sources: Path | Sequence[Path],
+    sources: Sources,
     settings: CutSettings = DEFAULT_CUTS,
     *,
     host: str | None = None,
