@@ -196,7 +196,7 @@ def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     length, height, speed = (
         table[name].to_numpy() for name in ("dimension_length", "dimension_height", "velocity_magnitude")
     )
-    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else None
+    width = table[dlr_ht.WIDTH_COLUMN].to_numpy() if dlr_ht.WIDTH_COLUMN in table else None
     short = _short(table["id"].astype(str).to_numpy(dtype=str))
     names = tuple(short[str(name)] for name in table["id"][np.r_[True, np.diff(vehicle) != 0]])
     place = x - made.origin[0], y - made.origin[1], np.full(len(x), np.nan)  # headings are not recorded

@@ -22,8 +22,8 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.columns import require_row_step
 from xosc_lateral.files.sumo import (
+    LANE_WIDTH,
     TRUCKS,
-    WIDTH,
     SumoLane,
     SumoNet,
     fcd_vehicles,
@@ -40,14 +40,14 @@ from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_co
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
 
 LICENCE = "that of the simulation"
-ROW = ("time", "name", "lane", "pos", "side", "speed", "kind", "x", "y", "angle")
+ROW_COLUMNS = ("time", "name", "lane", "pos", "side", "speed", "kind", "x", "y", "angle")
 NET_ENDINGS = (".net.xml", ".net.xml.gz")
 REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m [-]
 
 
 @importer
 def import_fcd(
-    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = WIDTH
+    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = LANE_WIDTH
 ) -> ImportedDrives:
     """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
@@ -57,7 +57,7 @@ def import_fcd(
     vehicles = fcd_vehicles(source, "a vehicle outside a timestep")
     known = None if net is None else read_sumo_net(Path(net))
     vehicle_types = read_vehicle_types(None if types is None else Path(types))
-    rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW))
+    rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW_COLUMNS))
     rows["is_inner"] = rows["lane"].astype(str).str.startswith(":")
     rows = rows[~rows["is_inner"]] if known is None else rows
     if rows.empty:

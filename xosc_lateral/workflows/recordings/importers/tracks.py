@@ -41,7 +41,7 @@ TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "tru
 INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 CURVATURE_WINDOW = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 FACING_STEP = 5.0  # of places at which lanes beside each other are compared: 2 mm off at R = 100 m [m]
-STEP = 1.0  # points of a centre line are at most this far apart, so that the nearest one is next to a point's foot [m]
+POINT_SPACING = 1.0  # of a centre line, at most, so that the nearest point is next to a foot on it [m]
 END_TOLERANCE = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
 Piece = tuple[int, int, int]  # road, lane section, lane
 
@@ -347,10 +347,10 @@ def _way(line: FloatArray) -> FloatArray:
 
 
 def _dense(line: FloatArray) -> FloatArray:
-    """Without points that are there twice, and none farther from the next than `STEP`."""
+    """Without points that are there twice, and none farther from the next than `POINT_SPACING`."""
     line = line[np.r_[True, np.hypot(*np.diff(line[:, :2], axis=0).T) > 1e-9]]
     size, way = np.hypot(*np.diff(line[:, :2], axis=0).T), _way(line)
-    count = np.maximum(np.ceil(size / STEP).astype(np.int64), 1)
+    count = np.maximum(np.ceil(size / POINT_SPACING).astype(np.int64), 1)
     piece = np.repeat(np.arange(len(size)), count)
     within = np.concatenate([np.arange(n) / n for n in count]) if len(count) else np.zeros(0)
     at = np.append(way[piece] + within * size[piece], way[-1])
