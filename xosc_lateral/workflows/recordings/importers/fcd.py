@@ -20,19 +20,8 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.files import sumo
 from xosc_lateral.files.columns import require_row_step
-from xosc_lateral.files.sumo import (
-    LANE_WIDTH,
-    TRUCKS,
-    SumoLane,
-    SumoNet,
-    fcd_vehicles,
-    number_of,
-    read_sumo_net,
-    read_vehicle_types,
-    usual_length,
-    wrong_element,
-)
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
@@ -47,16 +36,16 @@ REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the le
 
 @importer
 def import_fcd(
-    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = LANE_WIDTH
+    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = sumo.LANE_WIDTH
 ) -> ImportedDrives:
     """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
 
     `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
     file with the vehicle types, for lengths. `lane_width`: without a network. [m]
     """
-    vehicles = fcd_vehicles(source, "a vehicle outside a timestep")
-    known = None if net is None else read_sumo_net(Path(net))
-    vehicle_types = read_vehicle_types(None if types is None else Path(types))
+    vehicles = sumo.fcd_vehicles(source, "a vehicle outside a timestep")
+    known = None if net is None else sumo.read_sumo_net(Path(net))
+    vehicle_types = sumo.read_vehicle_types(None if types is None else Path(types))
     rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW_COLUMNS))
     rows["is_inner"] = rows["lane"].astype(str).str.startswith(":")
     rows = rows[~rows["is_inner"]] if known is None else rows
@@ -83,22 +72,22 @@ def _rows(vehicles: Iterator[tuple[float, Any]], source: Path) -> Iterator[tuple
     for time, element in vehicles:
         if element.get("posLat") is None:
             what = "no posLat: it is written with the sublane model and --fcd-output.attributes all"
-            raise wrong_element(what, element, source)
+            raise sumo.wrong_element(what, element, source)
         if element.get("lane") is None or element.get("id") is None:
-            raise wrong_element("no id or lane", element, source)
-        place = (number_of(element, name, source) for name in ("pos", "posLat", "speed"))
+            raise sumo.wrong_element("no id or lane", element, source)
+        place = (sumo.number_of(element, name, source) for name in ("pos", "posLat", "speed"))
         seen = (float(element.get(name, "nan")) for name in ("x", "y", "angle"))
         yield time, element.get("id"), element.get("lane"), *place, element.get("type", ""), *seen
 
 
 def _drive_table(
-    rows: pd.DataFrame, net: SumoNet, types: dict[str, tuple[float, str]], left_hand: bool, source: Path
+    rows: pd.DataFrame, net: sumo.SumoNet, types: dict[str, tuple[float, str]], left_hand: bool, source: Path
 ) -> pd.DataFrame:
     vehicle, names = rows["name"].factorize()
     time, side, speed = (rows[name].to_numpy() for name in ("time", "side", "speed"))
-    kinds = [types.get(kind.partition("@")[0], (usual_length(kind), kind)) for kind in rows["kind"]]
+    kinds = [types.get(kind.partition("@")[0], (sumo.usual_length(kind), kind)) for kind in rows["kind"]]
     length = np.array([size for size, _ in kinds])
-    is_truck = np.array([any(word in kind.lower() for word in TRUCKS) for _, kind in kinds])
+    is_truck = np.array([any(word in kind.lower() for word in sumo.TRUCKS) for _, kind in kinds])
     # lanes of an edge lie side by side, counted from the right here
     numbers, following = _driving_lanes(net)
     edges: dict[str, list[int]] = {}
@@ -123,23 +112,23 @@ def _drive_table(
     })  # fmt: skip
 
 
-def _driving_lanes(net: SumoNet) -> tuple[dict[str, int], list[list[int]]]:
+def _driving_lanes(net: sumo.SumoNet) -> tuple[dict[str, int], list[list[int]]]:
     """Numbers of the lanes that vehicles drive on, and those that each leads to."""
     numbers = {name: k for k, name in enumerate(name for name, lane in net.lanes.items() if lane.is_driving)}
     return numbers, [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
 
 
-def _net_of(rows: pd.DataFrame, width: float) -> SumoNet:
+def _net_of(rows: pd.DataFrame, width: float) -> sumo.SumoNet:
     """What the output alone says of the lanes: those in which somebody was, and all on their right."""
     last, end = dict[str, int](), dict[str, float]()
     for name, place in zip(rows["lane"], rows["pos"], strict=True):
         edge, _, index = name.rpartition("_")
         last[edge], end[edge] = max(last.get(edge, 0), int(index)), max(end.get(edge, 0.0), place)
-    lanes = [SumoLane(edge, k, width, end[edge], True) for edge, top in last.items() for k in range(top + 1)]
-    return SumoNet(lanes={f"{lane.edge}_{lane.index}": lane for lane in lanes})
+    lanes = [sumo.SumoLane(edge, k, width, end[edge], True) for edge, top in last.items() for k in range(top + 1)]
+    return sumo.SumoNet(lanes={f"{lane.edge}_{lane.index}": lane for lane in lanes})
 
 
-def _left_hand(rows: pd.DataFrame, net: SumoNet, stated: bool | None, source: Path) -> bool:
+def _left_hand(rows: pd.DataFrame, net: sumo.SumoNet, stated: bool | None, source: Path) -> bool:
     """Whether sides are counted from the left kerb: as the network says, which positions must not contradict."""
     lanes = [net.lanes[name] for name in rows["lane"]]
     across = np.array([lane.index * lane.width for lane in lanes]) + rows["side"].to_numpy()
@@ -154,7 +143,7 @@ def _left_hand(rows: pd.DataFrame, net: SumoNet, stated: bool | None, source: Pa
 
 
 # ---- for `reconstruct`: the lanes of a network as lines, and where vehicles' rear axles were -------------------------
-def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:
+def lanes_of_net(net: sumo.SumoNet, path: Path) -> list[DrivenLane]:
     """Lanes that vehicles drive on, those inside junctions included. Raises `FormatError`: a lane without a shape."""
     numbers, following = _driving_lanes(net)
     if not numbers:
@@ -183,13 +172,13 @@ def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:
 def read_fcd(path: Path) -> Tracks:
     """Tracks of the rear axles, which pass where the front did: SUMO turns vehicles about their front."""
     rows, names, types = list[tuple[float, ...]](), dict[str, int](), list[str]()
-    for time, element in fcd_vehicles(path, outside := "a vehicle without id, or outside a timestep"):
+    for time, element in sumo.fcd_vehicles(path, outside := "a vehicle without id, or outside a timestep"):
         if (name := element.get("id")) is None:
-            raise wrong_element(outside, element, path)
+            raise sumo.wrong_element(outside, element, path)
         if name not in names:
             names[name] = len(names)
             types.append(element.get("type", "").lower())
-        rows.append((names[name], time, *(number_of(element, key, path) for key in ("x", "y", "angle", "speed"))))
+        rows.append((names[name], time, *(sumo.number_of(element, key, path) for key in ("x", "y", "angle", "speed"))))
     if not rows:
         raise NotEnoughDataError(f"{path}: no vehicle")
     values = np.array(rows)
@@ -198,8 +187,8 @@ def read_fcd(path: Path) -> Tracks:
     same = vehicle[1:] == vehicle[:-1]
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
-    kind = np.array(["truck" if any(word in name for word in TRUCKS) else "" for name in types])[vehicle]
-    length = np.array([usual_length(name) for name in types])[vehicle]
+    kind = np.array(["truck" if any(word in name for word in sumo.TRUCKS) else "" for name in types])[vehicle]
+    length = np.array([sumo.usual_length(name) for name in types])[vehicle]
     heading = 0.5 * np.pi - np.radians(angle)
     for part in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):
         first, behind = part[0], REAR_FROM_FRONT * length[part[0]]
