@@ -20,8 +20,8 @@ from examples.driver_simulator import simulate_drive
 from laboratory.fair_measure import halves
 from laboratory.identification_drives import moved, offset_of
 from tests.kit import simulated as plants
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
-from xosc_lateral.drivers.evaluation.sizes import LEVEL, Sizes, differences, sizes_of_runs
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, all_runs
+from xosc_lateral.drivers.evaluation.sizes import SIGNIFICANCE_LEVEL, Sizes, differences, sizes_of_runs
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.files.drives import drives_of_table, read_drives
 
@@ -51,7 +51,7 @@ def sizes(tables: Sequence[pd.DataFrame], *, wider: float = 1.0, shift: float = 
 def report(name: str, pairs: Sequence[tuple[Sizes, Sizes]]) -> None:
     """A line: how many are told apart, and the least difference that would be, in the median."""
     found = [differences(*pair) for pair in pairs]
-    apart = sum(min(part.p_value for part in parts) <= LEVEL for parts in found)
+    apart = sum(min(part.p_value for part in parts) <= SIGNIFICANCE_LEVEL for parts in found)
     least = {part.quantity: [] for part in found[0]}
     for part in (part for parts in found for part in parts):
         least[part.quantity].append(float(np.exp(part.least)) if part.is_factor else part.least)

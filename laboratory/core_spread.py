@@ -21,16 +21,15 @@ from numpy.typing import NDArray
 
 from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, all_runs
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coarse
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import fit_autoregression
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression, stabilise
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, stabilise
 from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]

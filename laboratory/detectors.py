@@ -35,7 +35,7 @@ from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.detectors import RULES, LateralSpeed
 from xosc_lateral.workflows.detection.logistic import train
-from xosc_lateral.workflows.detection.observation import PERFECT, USUAL_SENSOR, Sensor, View, views_of
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, USUAL_SENSOR, Sensor, View, views_of
 from xosc_lateral.workflows.detection.sources import SourceSettings, checked, drive_scenes, sources_of
 from xosc_lateral.workflows.detection.tracks import Scene
 
@@ -82,7 +82,7 @@ def _half(name: str) -> int:
     return crc32(name[-10:].encode()) % 2
 
 
-def seen(scenes: Iterable[Scene], sensor: Sensor = PERFECT) -> Views:
+def seen(scenes: Iterable[Scene], sensor: Sensor = PERFECT_SENSOR) -> Views:
     return [(scene, views_of(scene, sensor, SEED)) for scene in scenes]
 
 
@@ -181,7 +181,7 @@ def main() -> None:
         if "trained" in parts:
             scenes, rows = training(given, folder), dict[str, dict[str, list[str]]]()
             runs = [scene for path in given.runs for scene in run_scenes(path)]
-            for word, sensor in (("perfect", PERFECT), ("usual", USUAL_SENSOR)):
+            for word, sensor in (("perfect", PERFECT_SENSOR), ("usual", USUAL_SENSOR)):
                 detectors = {
                     name: train((view for _, views in seen(each, sensor) for view in views), 0.5, name)
                     for name, each in scenes.items()

@@ -17,13 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive, all_runs
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism, score_realism
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.files.drives import read_drives
-from xosc_lateral.workflows.profiles.realism_text import FAMILIES
+from xosc_lateral.workflows.profiles.realism_text import FAMILY_LABELS
 
 
 def halves(drives: Sequence[Drive], seed: int) -> tuple[list[Drive], list[Drive]]:
@@ -42,7 +41,7 @@ def measure(drives: Sequence[Drive], seed: int, model: str, *, classify: bool) -
 
 
 def table(parts: Sequence[Realism]) -> list[str]:
-    columns = list(FAMILIES.values())
+    columns = list(FAMILY_LABELS.values())
     columns += ["AUC", "with context", "AUC of real drivers", "AUC by convolutions"]
     lines = [f"| snippets | sampled | {' | '.join(columns)} |", "|---" * (len(columns) + 2) + "|"]
     for scores in parts[0].conditions:
@@ -54,7 +53,7 @@ def table(parts: Sequence[Realism]) -> list[str]:
 
 def _line(parts: Sequence[ConditionScores]) -> str:
     cells = []
-    for family in FAMILIES:
+    for family in FAMILY_LABELS:
         found = [one.families[family] for one in parts if family in one.families]
         ratio = np.exp(np.mean([np.log(one.ratio) for one in found])) if found else np.nan
         cells.append(f"{ratio:.2f}" if found else "")

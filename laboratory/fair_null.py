@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.drivers.evaluation.snippets import Snippets, sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import slow_movement, thinned

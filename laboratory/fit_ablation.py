@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 
 from laboratory.markers import show
 from laboratory.model_choice import LENGTHS, snippets
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.fitting import driver_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS, fit_autoregression
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, split_bands
+from xosc_lateral.drivers.model.core.autoregressive.parameters import COARSE_EVERY, split_bands
 from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]

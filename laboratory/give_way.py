@@ -1,9 +1,9 @@
-"""Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: for `give_way.GAPS`.
+"""Lateral gaps of vehicles side by side, beside those of any two of the two lanes: for `give_way.GAP_QUANTILES`.
 
     python -m laboratory.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 
 Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way
-(`RESPONDING`, of `motorway`), and with the law by which `convert` makes them.
+(`RESPONDING_GAPS`, of `motorway`), and with the law by which `convert` makes them.
 """
 
 from __future__ import annotations

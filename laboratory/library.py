@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 from laboratory.comparison import driver_distances
 from laboratory.refined import NOTES, refine_population, refined_profile
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.drive import Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics

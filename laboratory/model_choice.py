@@ -19,8 +19,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from laboratory.fair_null import slow_test
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.snippets import snippets_of

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from laboratory.fair_measure import halves
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.cuts import all_runs
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.evaluation.snippets import sample_runs
 from xosc_lateral.drivers.fitting.fitting import fit_profile

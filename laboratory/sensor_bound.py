@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from laboratory.markers import show
 from laboratory.sensor_split import CALM, GUSTS, RATIOS, ROUNDED, SEEDS, STEP, drives_of, errors, in_runs
-from xosc_lateral.drivers.drives.cuts import cut_runs
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive, cut_runs
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 
 FloatArray = NDArray[np.float64]

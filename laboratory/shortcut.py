@@ -16,7 +16,7 @@ from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.detection.logistic import FEATURES, features, fit_regression
 from xosc_lateral.workflows.detection.observation import View
 from xosc_lateral.workflows.detection.sources import played_scene
-from xosc_lateral.workflows.detection.tracks import EDGE, MARGIN, STEP, Scene
+from xosc_lateral.workflows.detection.tracks import EDGE_ROWS, MARGIN_ROWS, STEP, Scene
 
 FloatArray = NDArray[np.float64]
 Views = list[tuple[Scene, list[View]]]
@@ -79,9 +79,9 @@ def moments_of(views: Views, written: Mapping[tuple[str, int], Sequence[int]] | 
             rows = np.zeros(n, dtype=np.int8)
             rows[view.truth.keeping & view.watched] = 1
             for begin in begins:
-                if EDGE <= begin < n:
-                    rows[max(begin - BEFORE - MARGIN, 0) : begin + BEFORE] = 0
-                    rows[max(begin - BEFORE, EDGE) : begin + 1] = 2
+                if EDGE_ROWS <= begin < n:
+                    rows[max(begin - BEFORE - MARGIN_ROWS, 0) : begin + BEFORE] = 0
+                    rows[max(begin - BEFORE, EDGE_ROWS) : begin + 1] = 2
                     changes += 1
             chosen = np.flatnonzero(rows)
             chosen = chosen[chosen % EVERY == 0]

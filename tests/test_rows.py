@@ -57,9 +57,9 @@ def test_pages_of_the_file_leave_memory_by_themselves(tmp_path: Path, monkeypatc
         column = rows.empty(20_000_000)
         column[:] = np.arange(20_000_000)
     deadline = time.monotonic() + 20.0
-    while rows.status_bytes(2) - before > rows.MAPPED and time.monotonic() < deadline:
+    while rows.status_bytes(2) - before > rows.MAPPED_MEMORY and time.monotonic() < deadline:
         time.sleep(0.02)
-    assert rows.status_bytes(2) - before <= rows.MAPPED
+    assert rows.status_bytes(2) - before <= rows.MAPPED_MEMORY
     assert column[-1] == 19_999_999 and (np.diff(column[:1000]) == 1.0).all()
 
 

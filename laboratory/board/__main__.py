@@ -17,7 +17,7 @@ from laboratory.board.benchmark import benchmark_realism
 from laboratory.board.models.catalogue import MODELS
 from laboratory.board.record import board_record
 from laboratory.board.text import board_markdown, board_text
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import parse_map

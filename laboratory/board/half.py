@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.measures import (
+from xosc_lateral.drivers.evaluation.snippets import (
     FLOOR_DRAWS,
+    LENGTHS,
     Features,
+    SnippetCondition,
+    Snippets,
     features_of,
     real_against_real,
+    snippets_of,
     windows_with_the_same_start,
 )
-from xosc_lateral.drivers.evaluation.snippets import LENGTHS, SnippetCondition, Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

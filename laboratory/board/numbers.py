@@ -12,9 +12,8 @@ from laboratory.board.ranked import SHORT, ranked_numbers
 from laboratory.board.result import ModelScore
 from laboratory.board.sampled_half import SampledHalf
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.measures import UNITS, differences, named_distances
 from xosc_lateral.drivers.evaluation.metrics import SCORE_UNITS, proper_scores
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import UNITS, SnippetCondition, differences, named_distances
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

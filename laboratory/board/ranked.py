@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from xosc_lateral.drivers.evaluation.measures import FAMILIES
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import FAMILIES, SnippetCondition
 
 SHORT, LONG = 10.0, 30.0
 """Windows that count: the paper's, and long enough to see drivers come back. [s]"""

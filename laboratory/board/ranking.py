@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from laboratory.board.half import DRAWS, Half, floors
 from laboratory.board.ranked import SHORT, ranked_numbers
 from laboratory.board.sampled_half import SampledHalf
-from xosc_lateral.drivers.evaluation.measures import differences
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, differences
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

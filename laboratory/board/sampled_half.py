@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from laboratory.board.half import DRAWS, ENSEMBLE, Half
 from laboratory.board.models.base import LateralModel
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.measures import Features, features_of
 from xosc_lateral.drivers.evaluation.realism import VarianceParts, variance_parts
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets
+from xosc_lateral.drivers.evaluation.snippets import Features, SnippetCondition, Snippets, features_of
 from xosc_lateral.drivers.model.sampled_offsets import segment_of
 
 FloatArray = NDArray[np.float64]

@@ -15,9 +15,8 @@ from laboratory.board.result import Board, ModelScore, Row
 from laboratory.board.sampled_half import SampledHalf
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 from xosc_lateral.drivers.evaluation.realism import variance_parts
-from xosc_lateral.drivers.evaluation.snippets import BLOCK, FEW_DRIVES
+from xosc_lateral.drivers.evaluation.snippets import BLOCK_SECONDS, FEW_DRIVES, LAGS, autocorrelation_of, resolved_bands
 
 FloatArray = NDArray[np.float64]
 Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]
@@ -83,7 +82,7 @@ def make_board(
         runs=len(runs),
         hours=sum(map(len, runs)) * STEP / 3600.0,
         windows={one.name: sum(len(h.windows[one.seconds]) for h, _ in parts) for one in half.conditions},
-        unit="vehicle" if len({run.drive for run in runs}) >= FEW_DRIVES else f"block of {BLOCK:g} s",
+        unit="vehicle" if len({run.drive for run in runs}) >= FEW_DRIVES else f"block of {BLOCK_SECONDS:g} s",
         tau=kendall_tau(*np.array([by_half[key] for key in order]).T.tolist()) if len(order) > 1 else float("nan"),
         pairs_apart=agreement[0],
         pairs_agreeing=agreement[1],

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.snippets import BLOCK, FEW_DRIVES
+from xosc_lateral.drivers.evaluation.snippets import BLOCK_SECONDS, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def units_of(runs: Sequence[Run]) -> list[Run]:
         return list(runs)
     pieces = []
     for run in runs:
-        block = (run.time // BLOCK).astype(np.int64)
+        block = (run.time // BLOCK_SECONDS).astype(np.int64)
         for number in np.unique(block):
             rows = np.flatnonzero(block == number)
             if len(rows) > 1:
@@ -42,8 +42,8 @@ def halves(runs: Sequence[Run], seed: int) -> tuple[list[Run], list[Run]]:
     units = sorted({run.drive for run in runs})
     if len(units) < LEAST_UNITS:
         raise NotEnoughDataError(
-            f"{len(units)} vehicles (or blocks of {BLOCK:g} s) are left after cutting; {LEAST_UNITS} are needed to fit "
-            "on one half and score on the other"
+            f"{len(units)} vehicles (or blocks of {BLOCK_SECONDS:g} s) are left after cutting; {LEAST_UNITS} are "
+            "needed to fit on one half and score on the other"
         )
     chosen = set(np.random.default_rng(seed).permutation(units)[: len(units) // 2].tolist())
     return [run for run in runs if run.drive in chosen], [run for run in runs if run.drive not in chosen]

@@ -7,7 +7,7 @@ import pytest
 
 from laboratory.shortcut import area, moments_of, told_before
 from tests.kit.lane_tracks import lane_change, scene, track, weave
-from xosc_lateral.workflows.detection.observation import PERFECT, views_of
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, views_of
 
 TIME = 0.1 * np.arange(1200)
 
@@ -23,7 +23,7 @@ def test_a_driver_who_calms_down_before_a_lane_change_is_found(given_away):
         if given_away:
             movement *= 1.0 - 0.9 * np.exp(-(((TIME - begin + 2.0) / 3.0) ** 2))
         made = scene(track(movement + lane_change(TIME, begin, 5.0), name=f"v{number}"))
-        views.append((made, views_of(made, PERFECT, 0)))
+        views.append((made, views_of(made, PERFECT_SENSOR, 0)))
     written = {(f"v{number}", 1): [change.begin for change in found[0].truth.changes] for number, (_, found) in
                enumerate(views)}  # fmt: skip
     auc, low, high = told_before(moments_of(views, written))

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 import xosc_lateral as xl
-from xosc_lateral.cli import MODULES, VERBS, app, verb
+from xosc_lateral.cli import VERB_MODULES, VERBS, app, verb
 
 HEAVY = ("matplotlib", "numba", "pandas", "scipy", "scenariogeneration", "pyarrow", "joblib", "sklearn", "rich")
 
@@ -74,5 +74,5 @@ def test_every_module_of_the_command_line_is_a_verb_or_shared() -> None:
     with_verb = {
         path.stem for path in folder.glob("*.py") if "app = group_of_verbs()" in path.read_text(encoding="utf-8")
     }
-    verbs = {verb: MODULES.get(verb, verb.replace("-", "_")) for verb in VERBS}
+    verbs = {verb: VERB_MODULES.get(verb, verb.replace("-", "_")) for verb in VERBS}
     assert with_verb == set(verbs.values())

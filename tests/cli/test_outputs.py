@@ -261,11 +261,13 @@ def test_a_log_names_files_and_ends_with_its_command(tmp_path, capsys):
 
 
 def test_every_verb_names_a_page_that_exists():
-    from xosc_lateral.cli.words import PAGES
+    from xosc_lateral.cli.words import DOCS_PAGES
 
     root = Path(__file__).resolve().parents[2]
-    assert {page for pages in PAGES.values() for page in pages.split(", ") if not (root / page).exists()} == set()
-    assert set(PAGES) | {"__init__", "words"} == {path.stem for path in (root / "xosc_lateral" / "cli").glob("*.py")}
+    assert {page for pages in DOCS_PAGES.values() for page in pages.split(", ") if not (root / page).exists()} == set()
+    assert set(DOCS_PAGES) | {"__init__", "words"} == {
+        path.stem for path in (root / "xosc_lateral" / "cli").glob("*.py")
+    }
 
 
 def test_a_closed_loop_that_is_interrupted_says_what_it_was_at(capsys):

@@ -22,7 +22,7 @@ from tests.kit.profiles import simulated_profile
 from tests.kit.scenario_files import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.limits import context_range
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.drivers.loop.columns import Role
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.stream import OffsetStream

@@ -23,7 +23,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.files.output_tables import csv_text
 from xosc_lateral.files.profiles import profile_bytes
-from xosc_lateral.workflows.batch.batch import STATE
+from xosc_lateral.workflows.batch.batch import STATE_FOLDER
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
 from xosc_lateral.world.scenario.distribution import Deterministic, ValueSets
@@ -207,7 +207,7 @@ def test_a_product_of_many_parts_comes_one_by_one():
 
 def test_the_lock_is_an_event_where_the_log_is_json(tmp_path, capsys):
     write_template("cut-in", tmp_path / "in")
-    with folder_lock(tmp_path / "out" / STATE / "lock"):
+    with folder_lock(tmp_path / "out" / STATE_FOLDER / "lock"):
         assert main(["convert", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--log-json"]) == 1
     event = json.loads(capsys.readouterr().err.splitlines()[-1])
     assert event["event"] == "error" and "another run" in event["error"]["message"]

@@ -8,7 +8,8 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.declarations import (
+from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.references import (
     broken_constraint,
     declared_values,
     entry_scope,
@@ -16,7 +17,6 @@ from xosc_lateral.files.openscenario.declarations import (
     read_declarations,
     read_variables,
 )
-from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.world.scenario.enums import ParameterType
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Unsupported

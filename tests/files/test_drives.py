@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import parse_map
 

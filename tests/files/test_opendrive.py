@@ -12,7 +12,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 
 DATA = Path(__file__).parents[1] / "data" / "xodr"
 VALID = sorted((DATA / "valid").glob("*.xodr"))

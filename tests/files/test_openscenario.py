@@ -25,8 +25,8 @@ from tests.kit.scenario_files import (
     write_scenario,
 )
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.catalogs import LEVELS_UP
 from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.openscenario.references import LEVELS_UP
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition, TimeHeadwayCondition
 from xosc_lateral.world.scenario.enums import ConditionEdge, DynamicsShape, Priority, Rule, VehicleCategory
 from xosc_lateral.world.scenario.place import Unsupported

@@ -28,7 +28,7 @@ from tests.kit.scenario_files import (
     write_scenario,
 )
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.fit import write_converted

@@ -29,7 +29,7 @@ from tests.kit.scenario_files import (
     write_scenario,
 )
 from xosc_lateral.base.errors import FormatError, PlaybackError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.provenance import provenance_of
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario

@@ -11,9 +11,10 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.profiles import simulated_profile
+from tests.kit.schema import profile_schema
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.drivers.model.effects import Acts, Drift, Linear
-from xosc_lateral.drivers.model.profile import DriverProfile, profile_schema
+from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.profiles import (
     SCHEMA,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.catalogs import LEVELS_UP, Boundary, allowed_roots
+from xosc_lateral.files.openscenario.references import LEVELS_UP, Boundary, allowed_roots
 from xosc_lateral.world.scenario.place import Place
 
 PLACE = Place(path=Path("s.xosc"), line=7, element="LogicFile")

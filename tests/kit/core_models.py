@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, Volatility
 from xosc_lateral.drivers.model.core.base import ShapedNoise
 
 DAMPING = np.concatenate([np.zeros(5), np.linspace(0.02, 0.001, 46)])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.live.esmini import LATERAL
+from xosc_lateral.workflows.live.esmini import LATERAL_ACTIONS
 from xosc_lateral.workflows.live.esmini_library import ObjectState
 from xosc_lateral.world.motion.nominal import Activity
 
@@ -44,7 +44,11 @@ class StandIn:
         time = row * STEP
         for action in self.motion.actions:
             end = np.inf if action.end is None else action.end
-            written = action.actor == name and isinstance(action.action.content, LATERAL) and "Init" not in action.path
+            written = (
+                action.actor == name
+                and isinstance(action.action.content, LATERAL_ACTIONS)
+                and "Init" not in action.path
+            )
             if written and action.start - 1e-9 <= time < end:
                 return action
         return None

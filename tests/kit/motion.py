@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork

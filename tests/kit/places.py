@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from lxml import etree
 
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.road.network import RoadNetwork
 
 BEYOND = 1000.0

@@ -86,6 +86,7 @@ def test_what_is_declared_becomes_an_option_and_an_entry_of_the_docstring() -> N
         (["sample", "-p", "nobody", "--duration", "5", "-o", "-"], "--profile: no profile 'nobody'"),
         (["convert", "SCENARIO", "--profile", "nobody"], "--profile: no profile 'nobody'"),
         (["convert", "SCENARIO", "--entity", "Truck=nobody"], "--entity: no profile 'nobody'"),
+        (["sample", "--seed", "0", "-p", "0", "--duration", "5", "-o", "-"], "--profile: no profile '0'"),
         (["convert", "SCENARIO", "--road", "away.xodr"], "--road: away.xodr: no such road"),
         (["play", "SCENARIO", "-o", "-", "--road", "away.xodr"], "--road: away.xodr: no such road"),
         (["play", "SCENARIO", "-o", "-", "--road-path", "away"], "--road-path: away: no such folder"),

@@ -22,19 +22,7 @@ def printable(text: str) -> str:
 
 
 class FormatError(XoscLateralError, ValueError):
-    """A file can't be understood.
-
-    Parameters
-    ----------
-    what : str
-        What is wrong, with the value and, if known, what to do.
-    path : str or path-like, optional
-        The file.
-    line : int, optional
-        Line in the file, from 1.
-    element : str, optional
-        The XML element or table column, as in ``Event 'brake'``.
-    """
+    """What is wrong with a file, with value and what to do; `element`: XML element or column (``Event 'brake'``)."""
 
     def __init__(self, what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> None:
         self.what, self.path, self.line, self.element = what, path, line, element

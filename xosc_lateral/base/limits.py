@@ -53,8 +53,8 @@ TIME = Limit(1e10, "s", "time stamp", "seconds since 1970 until the year 2286; b
 DRIVE_SPAN = Limit(2.7e6, "s", "time that one drive covers", "a month; 13.5 million model steps")
 CLOCK_ROWS = Limit(30e6, "", "rows of an evenly sampled log", "two weeks at 25 Hz; 240 MB a channel")
 
-EXPRESSION = Limit(10_000, "", "characters of an expression", "field files stay below 200")
-VALUE = Limit(10_000, "", "characters of a parameter's value", "each reference may double it: 40 fill any memory")
+EXPRESSION_SIZE = Limit(10_000, "", "characters of an expression", "field files stay below 200")
+VALUE_SIZE = Limit(10_000, "", "characters of a parameter's value", "each reference may double it: 40 fill any memory")
 PARAMETER_SETS = Limit(100_000, "", "parameter sets of one distribution", "a day of conversions on two cores")
 COMBINATIONS = Limit(1_000_000, "", "combinations of parameters tried", "constraints may leave some out")
 DISTRIBUTION_TIME = Limit(120, "s", "time to draw the parameter sets of a distribution", "100 000 take seconds")

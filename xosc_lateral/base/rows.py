@@ -3,7 +3,7 @@
 A run of a day has millions of rows, one of an hour with hundreds of cars a hundred million. Whoever works on all of
 them does so with `blocks`, and makes columns that last with `columns`, `stored` and `empty`. Within `beside`, columns
 beyond `IN_MEMORY` are mapped from a file without a name, which is gone with the last of them, however the process ends.
-A thread gives its pages in memory back as soon as they are more than `MAPPED`; nothing is lost by that, since the
+A thread gives its pages in memory back as soon as they are more than `MAPPED_MEMORY`; nothing is lost by that: the
 mapping is shared with the file (madvise(2), MADV_DONTNEED). Where the system can't, all is in memory.
 """
 
@@ -32,21 +32,18 @@ BLOCK = 65_536
 IN_MEMORY = 64e6
 """Columns of one run that are in memory before others go to the file: 2 h of one car, as of 100 for 70 s. [byte]"""
 
-MAPPED = 50e6
+MAPPED_MEMORY = 50e6
 """Pages of the file that may be in memory: what two or three passes over a block touch. [byte]"""
 
 LOOK_EVERY = 0.01
 """How often they are counted: a pass over a file at 5 GB/s brings as many again meanwhile. [s]"""
 
-CHUNK = 64 << 20
+CHUNK_SIZE = 64 << 20
 """Least that the file grows by; a long one grows by an eighth, since each piece takes one of the open files. [byte]"""
 
 
 def status_bytes(column: int) -> int:
-    """Memory of this process, of the columns of /proc/self/statm (0: all, 1: resident, 2: of files). [byte]
-
-    0 where the system does not say.
-    """
+    """Memory by a column of /proc/self/statm (0: all, 1: resident, 2: of files); 0: the system does not say. [byte]"""
     if not sys.platform.startswith("linux"):
         return 0
     return int(Path("/proc/self/statm").read_bytes().split()[column]) * mmap.PAGESIZE
@@ -70,7 +67,7 @@ class _Store:
         if self.memory >= 0 or size == 0:
             return np.empty(shape, kind)
         if self._chunk is None or len(self._chunk) - self._free < size:
-            self._chunk, self._free = self.grown(max(CHUNK, self._size // 8, size)), 0
+            self._chunk, self._free = self.grown(max(CHUNK_SIZE, self._size // 8, size)), 0
         values = np.frombuffer(self._chunk, kind, size // kind.itemsize, self._free).reshape(shape)
         self._free += -(-size // 64) * 64  # a line of the processor's cache
         return values
@@ -130,7 +127,7 @@ def _give_back() -> None:
             if not chunks:
                 _is_giving_back = False
                 return
-        if status_bytes(2) - other_pages > MAPPED:
+        if status_bytes(2) - other_pages > MAPPED_MEMORY:
             for chunk in chunks:
                 chunk.madvise(mmap.MADV_DONTNEED)
             other_pages = status_bytes(2)
@@ -159,7 +156,7 @@ def put(column: NDArray[Any], rows: slice, values: NDArray[Any]) -> None:
 def scratch(n: int) -> NDArray[np.float64]:
     """A column to be filled that is gone after the work on one vehicle: in memory, unless it is long."""
     store = _store.get()
-    if store is None or 8 * n <= MAPPED / 10:
+    if store is None or 8 * n <= MAPPED_MEMORY / 10:
         return np.empty(n)
     return np.frombuffer(store.grown(8 * n), dtype=np.float64, count=n)
 
@@ -179,14 +176,9 @@ def stored(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any]]:
-    """Columns that last, shape (n,) each, from blocks of their rows in order; read-only where all values are the same.
+    """Columns that last, shape (n,) each with n at least 1; read-only where all values are the same.
 
-    Parameters
-    ----------
-    n : int
-        Rows in all, 1 or more.
-    parts : iterable of sequence of array
-        The same columns each time, shape (rows of the block,) each.
+    `parts`: blocks of their rows in order, the same columns each time, shape (rows of the block,) each.
     """
     made: list[NDArray[Any]] = []
     begin = 0
@@ -225,12 +217,7 @@ def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int =
 
 
 def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
-    """The longest slices in which a mask is True throughout, in order.
-
-    Parameters
-    ----------
-    mask : array of bool, shape (n,)
-    """
+    """The longest slices in which a mask, shape (n,), is True throughout, in order."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [slice(first, stop) for first, stop in edges.reshape(-1, 2).tolist()]
 

@@ -1,8 +1,9 @@
-"""Texts that people write in more than one way."""
+"""Texts that people write in more than one way, and texts set in columns."""
 
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -16,3 +17,9 @@ def composed(value: Any) -> Any:
     if isinstance(value, dict):
         return {composed(key): composed(one) for key, one in value.items()}
     return [composed(one) for one in value] if isinstance(value, list) else value
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of a table as lines with aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]

@@ -40,7 +40,7 @@ VERBS = {
 }
 """Name -> what it does."""
 
-MODULES = {
+VERB_MODULES = {
     "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "view": "play", "segments": "play",
     "template": "play", "import": "import_", "export": "live",
 }  # fmt: skip
@@ -80,7 +80,7 @@ def verb(name: str) -> Any:
     """The command of a verb, its module loaded, and with the options of its call."""
     from xosc_lateral.cli.words import with_options
 
-    app = import_module(f"xosc_lateral.cli.{MODULES.get(name, name.replace('-', '_'))}").app
+    app = import_module(f"xosc_lateral.cli.{VERB_MODULES.get(name, name.replace('-', '_'))}").app
     chosen = group_of_verbs()
     chosen.registered_commands = [info for info in app.registered_commands if info.name == name]
     chosen.registered_groups = [info for info in app.registered_groups if info.name == name]

@@ -10,7 +10,6 @@ import typer
 from typer.core import TyperCommand
 
 import xosc_lateral as xl
-from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say_json, warn, write_stdout
@@ -23,18 +22,6 @@ if TYPE_CHECKING:
 # What is said of one option stays together.
 # fmt: off
 app = group_of_verbs()
-
-BATCH = "Batches"
-
-
-def _some_processes(jobs: int) -> int:
-    if jobs == 0 or jobs < -1:
-        raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
-    return jobs
-
-
-Jobs = Annotated[int, typer.Option(help="Number of processes; -1: one per core.", callback=_some_processes)]
-
 
 class _WithPanels(TyperCommand):
     """Options of a batch under a heading of their own, which Typer has only where rich formats."""
@@ -66,22 +53,10 @@ def convert(
     output: Annotated[str | None, typer.Option("-o", "--output",
         help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder.")] = None,
     settings: Annotated[Options, ConvertSettings],
-    variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
-    report: Annotated[str | None, typer.Option(metavar="PAGE.html",
-        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
+    batch: Annotated[Options, xl.convert_many],
     osi: Osi = None,
-    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", callback=_some_processes,
-        rich_help_panel=BATCH)] = 1,
-    job_timeout: Annotated[float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400,
-        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
-    job_memory: Annotated[float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6,
-        rich_help_panel=BATCH)] = JOB_MEMORY.value,
-    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.",
-        rich_help_panel=BATCH)] = None,
-    keep_old: Annotated[bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.",
-        rich_help_panel=BATCH)] = False,
     log_json: Annotated[bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.",
-        rich_help_panel=BATCH)] = False,
+        rich_help_panel="Batches")] = False,
     reply: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
@@ -89,16 +64,15 @@ def convert(
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
+    report = batch.get("report")
     if len(scenario) == 1 and is_single(scenario[0]):
-        _convert_one(Path(scenario[0]), output, options, variants, report, osi, reply)
+        _convert_one(Path(scenario[0]), output, options, batch["variants"], report, osi, reply)
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
     if report is not None and Path(report).is_file():
         raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
-    options |= {"variants": variants, "report": report, "workers": jobs, "cluster": cluster, "keep_old": keep_old}
-    options |= {"job_timeout": job_timeout, "job_memory": job_memory}
-    options["show"] = "json" if log_json else "quiet" if reply.quiet else "auto"
+    options |= {**batch, "show": "json" if log_json else "quiet" if reply.quiet else "auto"}
     _convert_batch(scenario, output, options, reply)
 
 
@@ -190,7 +164,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
 def verify(
     outputs: Annotated[list[Path], typer.Argument(metavar="OUTPUT...",
         help="Converted scenarios, or folders with a manifest.", show_default=False)],
-    *, options: Annotated[Options, xl.verify], jobs: Jobs = 1, reply: Printing,
+    *, options: Annotated[Options, xl.verify], jobs: int = 1, reply: Printing,
 ) -> None:
     """Make outputs again in memory and name those that differ, and why: edited, other inputs, another version."""
     result = xl.verify(outputs, **options, workers=0 if jobs == 1 else jobs)
@@ -207,13 +181,10 @@ def reproduce(
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
         show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
-    *, options: Annotated[Options, xl.reproduce],
-    jobs: Annotated[int, typer.Option(help="Of a folder: number of processes; -1: one per core.",
-        callback=_some_processes)] = 1,
-    reply: Written,
+    *, options: Annotated[Options, xl.reproduce], reply: Written,
 ) -> None:
     """Make an output, or a folder of them, again and compare the content; exit code 1 if it differs."""
-    result = xl.reproduce(output, new, **options, workers=jobs, force=reply.force)
+    result = xl.reproduce(output, new, **options, force=reply.force)
     reply.say(result, even=bool(result.failing))
     if result.failing:
         raise typer.Exit(1)

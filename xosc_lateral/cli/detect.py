@@ -34,13 +34,7 @@ def detect(
     reply: Written,
 ) -> None:
     """Count false alarms in lane keeping, cut-ins seen and the time before the marking, source by source."""
-    from xosc_lateral.files.output_paths import claim, output_file
-    from xosc_lateral.files.output_tables import output_suffixes
-    from xosc_lateral.workflows.result import PAGE_SUFFIXES
-
-    table = None if output is None else output_file(output, "detection.csv", output_suffixes())
-    page = None if report is None else output_file(report, "detection.html", PAGE_SUFFIXES)
-    claim([table, page], [source for source in sources if source.is_file()], force=reply.force)
+    table, page = reply.claim(sources, table=(output, "detection.csv"), page=(report, "detection.html"))
     with naming_option("--detector"):
         result = xl.detect(sources, **options)
     if table is not None:

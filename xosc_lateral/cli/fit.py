@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -29,14 +28,11 @@ def fit(
     reply: Written,
 ) -> None:
     """Fit a driver profile to measured drives."""
-    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.files.profiles import describe_profile, profile_bytes, profile_record
     from xosc_lateral.workflows.profiles.fit import fit_warnings
-    from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
     usual = options["name"] or tables[0].name.split(".")[0]
-    written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)
-    claim([written], tables, force=reply.force)
+    (written,) = reply.claim(tables, profile=(output, f"{usual}.json"))
     options["name"] = options["name"] or (usual if written is None else written.stem)
     profile = xl.fit(tables, **options)
     if written is None:
@@ -61,16 +57,11 @@ def sample(
     reply: Written,
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
-    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.files.output_tables import output_suffixes
-
     if sum(name in options for name in ("like", "context", "duration")) != 1:
         raise typer.BadParameter("give one of --like, --context, --duration")
-    if output != STDOUT:
-        inputs: list[Path] = [*options.get("like", ()), *options.get("context", ())]
-        claim([output_file(output, "offsets.csv", output_suffixes())], inputs, force=reply.force)
+    (written,) = reply.claim([*options.get("like", ()), *options.get("context", ())], table=(output, "offsets.csv"))
     made = xl.sample(**options)
-    if output == STDOUT:
+    if written is None:
         write_stdout(made.csv())
         reply.say_words(made.headline(), None)
     else:
@@ -87,11 +78,7 @@ def evaluate(
     reply: Written,
 ) -> None:
     """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
-    from xosc_lateral.files.output_paths import claim, output_file
-    from xosc_lateral.workflows.result import PAGE_SUFFIXES
-
-    page = None if report is None else output_file(report, "evaluation.html", PAGE_SUFFIXES)
-    claim([page], tables, force=reply.force)
+    (page,) = reply.claim(tables, page=(report, "evaluation.html"))
     result = xl.evaluate(drives=tables, **options)
     if page is not None:
         result.write_report(page, force=reply.force)

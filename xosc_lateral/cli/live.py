@@ -26,7 +26,7 @@ app.add_typer(group, name="live", short_help=VERBS["live"])
 export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
 app.add_typer(export, name="export", short_help=VERBS["export"])
 
-FCD = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
+FCD_COLUMNS = "x,y,angle,type,speed,pos,posLat,lane"  # What `import fcd` reads; SUMO leaves `posLat` out unless told.
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +39,9 @@ class Outputs:
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
-        from xosc_lateral.files.osi import SUFFIXES, osi_wanted
-        from xosc_lateral.files.output_paths import claim, output_file
-        from xosc_lateral.files.tables import TABLE_SUFFIXES
-
-        table = None if self.states is None else output_file(self.states, "states.csv", TABLE_SUFFIXES)
-        trace = None if self.osi is None else output_file(self.osi, f"{source.stem}_gt.mcap", SUFFIXES)
-        claim([table, trace], [source], force=reply.force)
-        osi_wanted(trace)
+        table, trace = reply.claim(
+            [source], table=(self.states, "states.csv"), trace=(self.osi, f"{source.stem}_gt.mcap")
+        )
         run = live(source, **options)
         if table is not None:
             run.write(table, force=reply.force)
@@ -79,7 +74,7 @@ def sumo(
     options: Annotated[Options, xl.live_sumo], outputs: Outputs, reply: Written,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
-    words = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
+    words = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD_COLUMNS)
     outputs.run(xl.live_sumo, config, reply, options=words, **options)
 
 
@@ -90,7 +85,7 @@ def sumo(
 def stdio(
     *, profile: str = "motorway", seed: int = 0,
     road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
-    library: Paths = (),
+    library: Paths = (), verbose: Verbose = False,
 ) -> None:
     """Answer lines on standard input, as docs/schemas/live.json has them, until there are no more."""
     import os

@@ -46,28 +46,20 @@ def play(
     reply: Written,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
-    from xosc_lateral.files.osi import SUFFIXES, osi_wanted
-    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.files.output_tables import output_suffixes
-
     if output is None and osi is None:
         raise typer.BadParameter("a table or, with --osi, a trace has to be named", param_hint="--output")
-    is_file = output is not None and output != STDOUT
-    table = output_file(output, f"{scenario.stem}.csv", output_suffixes()) if output is not None and is_file else None
-    trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
-    claim([table, trace], [scenario], force=reply.force)
-    osi_wanted(trace)
+    stem = scenario.stem
+    table, trace = reply.claim([scenario], table=(output, f"{stem}.csv"), trace=(osi, f"{stem}_gt.mcap"))
     played = xl.play(scenario, **options)
-    written = None
-    if output == STDOUT:
-        write_stdout(played.csv())
+    if table is not None:
+        played.write(table, force=reply.force)
     elif output is not None:
-        written = played.write(output, force=reply.force)
+        write_stdout(played.csv())
     if trace is not None:
         played.write_osi(trace, force=reply.force)
     if reply.as_json:
         traces = {} if trace is None else {"osi": str(trace)}
-        say_json({"output": None if written is None else str(written), **traces, **played.to_dict()})
+        say_json({"output": None if table is None else str(table), **traces, **played.to_dict()})
     elif not reply.quiet:
         for note in played.notes:
             typer.echo(note, err=True)

@@ -10,7 +10,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Printing, Written, command, say_json, write_stdout
-from xosc_lateral.workflows.profiles import keeping, profiles
+from xosc_lateral.workflows.profiles import profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
@@ -74,15 +74,6 @@ def derive(
     *,
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
-    sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
-    mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
-    restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
-    memory: Annotated[float | None, typer.Option(help="After which the autocorrelation is 1/e. [s]")] = None,
-    near_line: Annotated[float | None,
-        typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
-    speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
-    vehicle: Annotated[str | None, typer.Option("--class", metavar="truck",
-        help="What the base knows of trucks.")] = None,
     options: Annotated[Options, profiles.derive_profile],
     reply: Written,
 ) -> None:
@@ -93,11 +84,9 @@ def derive(
     from xosc_lateral.files.output_paths import STDOUT, output_file
     from xosc_lateral.files.profiles import profile_bytes
 
-    figures: Options = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
-    figures |= {"memory": memory, "near_line": near_line, "speed": speed, "vehicle": vehicle}
     if not options["name"] and output.endswith(".json"):
         options["name"] = output_file(output, "", (".json",)).stem
-    made = profiles.derive_profile(base, **options, **figures)
+    made = profiles.derive_profile(base, **options)
     if output == STDOUT:
         write_stdout(profile_bytes(made.profile))
         return
@@ -129,19 +118,19 @@ def tag(
 
 
 @command(group, "remove", "Delete profiles from a library.", "profiles remove mine --library team/")
-def remove(names: Names, *, options: Annotated[Options, keeping.remove_profiles], reply: Printing) -> None:
+def remove(names: Names, *, options: Annotated[Options, profiles.remove_profiles], reply: Printing) -> None:
     """Delete the files of profiles of your own, all or none; `profiles uses` says which outputs used them."""
-    reply.say_written(keeping.remove_profiles(names, **options))
+    reply.say_written(profiles.remove_profiles(names, **options))
 
 
 @command(group, "rename", "Give a profile another id.", "profiles rename mine night-driver --library team/")
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
-    *, options: Annotated[Options, keeping.rename_profile], reply: Written,
+    *, options: Annotated[Options, profiles.rename_profile], reply: Written,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
-    path = keeping.rename_profile(name, new, **options, force=reply.force)
+    path = profiles.rename_profile(name, new, **options, force=reply.force)
     reply.say_written(path, id=path.stem)
 
 
@@ -149,10 +138,10 @@ def rename(
 def uses(
     name: Annotated[str, typer.Argument(metavar="ID", help="Profile, in the library or no longer.")],
     outputs: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Of batches, or their manifests.")],
-    *, options: Annotated[Options, keeping.find_uses], reply: Printing,
+    *, options: Annotated[Options, profiles.find_uses], reply: Printing,
 ) -> None:
     """Which outputs of batches have offsets of a profile, of which vehicles, and whether it is the same now."""
-    reply.say(keeping.find_uses(name, outputs, **options))
+    reply.say(profiles.find_uses(name, outputs, **options))
 
 
 @command(

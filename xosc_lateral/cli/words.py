@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hi
 import typer
 
 from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
-    from xosc_lateral.workflows.options import Option
     from xosc_lateral.workflows.result import Result
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
-PAGES = {
+DOCS_PAGES = {
     "close_loop": "docs/closing_the_loop.md",
     "convert": "docs/scenarios.md, docs/pipeline.md",
     "detect": "docs/how_to/detect.md",
@@ -62,8 +62,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-la
 Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
 Columns = Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
     help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.")]
-MappingFile = Annotated[Path | None, typer.Option("--mapping", metavar="FILE.toml",
-    help="Saved mapping of columns (import table --propose FILE...).")]
+MappingFile = Annotated[Path | None, typer.Option(*MAPPING.flags, **MAPPING.words)]
 # fmt: on
 
 Options = dict[str, Any]
@@ -72,8 +71,6 @@ Options = dict[str, Any]
 
 def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     """Read ``NAME=VALUE`` words; wrong usage when there is no ``=`` or a name comes twice."""
-    from xosc_lateral.workflows.options import texts
-
     with naming_option(option):
         return texts(list(words or ()))
 
@@ -159,6 +156,26 @@ class Written(Printing):
 
     force: Force = False
 
+    def claim(self, inputs: Iterable[Path], **wanted: tuple[str | None, str]) -> list[Path | None]:
+        """Files that may be written, before any work: by kind what was said of one, and its usual name in a folder.
+
+        None: it is not wanted, or goes to standard output.
+        """
+        from xosc_lateral.files.osi import SUFFIXES, osi_wanted
+        from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+        from xosc_lateral.files.output_tables import output_suffixes
+        from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
+        from xosc_lateral.workflows.result import PAGE_SUFFIXES
+
+        suffixes = {"page": PAGE_SUFFIXES, "trace": SUFFIXES, "profile": PROFILE_SUFFIXES, "mapping": (".toml",)}
+        paths = {
+            kind: None if text in (None, STDOUT) else output_file(text, usual, suffixes.get(kind) or output_suffixes())
+            for kind, (text, usual) in wanted.items()
+        }
+        claim(paths.values(), [path for path in inputs if path.is_file()], force=self.force)
+        osi_wanted(paths.get("trace"))
+        return list(paths.values())
+
 
 def flags_of(name: str, option: Option) -> tuple[str, ...]:
     """How a setting is called on the command line."""
@@ -172,21 +189,11 @@ def _fields(group: type) -> list[Parameter]:
     return sorted(parameters, key=lambda parameter: parameter.name != "force")
 
 
-def _options_of(source: Any) -> dict[str, Option]:
-    """What can be set of a call or of settings, where they have only its name with what all verbs say of it."""
-    from xosc_lateral.workflows.options import SHARED, options_of
-
-    return {
-        name: replace(SHARED[name], read=option.read) if option.kind is None and name in SHARED else option
-        for name, option in options_of(source).items()
-    }
-
-
 def _parameters(source: Any, options: Mapping[str, Option]) -> Iterator[Parameter]:
     """The command line's options for them."""
     defaults = signature(source).parameters
     for name, option in options.items():
-        if name == "columns":
+        if option.kind is object:  # `columns`
             yield from _fields(Mapped)
             continue
         default = None if type(None) in get_args(option.kind) else defaults[name].default
@@ -198,7 +205,7 @@ def _read(options: Mapping[str, Option], words: dict[str, Any]) -> Options:
     """What was said of them; wrong usage if it can't be."""
     values = Options()
     for name, option in options.items():
-        if name == "columns":
+        if option.kind is object:  # `columns`
             values[name] = Mapped(words.pop("columns"), words.pop("mapping_file")).mapping()
         elif (stated := words.pop(name)) not in (None, []):
             with naming_option(flags_of(name, option)[0]):
@@ -212,13 +219,13 @@ def _naming_missing(stated: Mapping[str, Any]) -> Iterator[None]:
     try:
         yield
     except (XoscLateralError, OSError) as error:
-        missing = getattr(error, "unknown", None)
         path = error.filename if isinstance(error, OSError) else getattr(error, "path", None)
-        if path is not None and not Path(path).exists():
-            missing = str(path)
+        missing = str(path) if path is not None and not Path(path).exists() else getattr(error, "unknown", None)
         for option, value in stated.items():
-            texts = [str(text).rpartition("=")[2] for text in (value if isinstance(value, list) else [value])]
-            if missing is not None and str(missing) in texts:
+            words = [
+                str(word) for word in (value if isinstance(value, list) else [value]) if isinstance(word, str | Path)
+            ]
+            if missing in (*words, *(word.partition("=")[2] for word in words)):
                 error.add_note(option)
                 break
         raise
@@ -230,8 +237,6 @@ def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
     Such a parameter is a dataclass as `Printing`, or a mapping that is annotated with a class of settings or a call.
     What all verbs say alike (`SHARED`) needs its name only.
     """
-    from xosc_lateral.workflows.options import SHARED
-
     declared = signature(verb, eval_str=True).parameters
     plain = {name for name, parameter in declared.items() if not hasattr(parameter.annotation, "__metadata__")}
     shared = {name: option for name, option in SHARED.items() if name in plain}
@@ -249,7 +254,7 @@ def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
             added = _fields(source)
             groups[name] = [option.name for option in added]
         else:
-            sources[name] = {key: option for key, option in _options_of(source).items() if key not in declared}
+            sources[name] = {key: option for key, option in options_of(source).items() if key not in declared}
             added = list(_parameters(source, sources[name]))
         parameters += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in added]
 
@@ -273,7 +278,7 @@ def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any 
     """Add a verb to a group, with examples and its page at the end of its help; `cli.verb` gives it its options."""
 
     def add(verb: Verb) -> Verb:
-        page = PAGES[verb.__module__.rpartition(".")[2]]
+        page = DOCS_PAGES[verb.__module__.rpartition(".")[2]]
         lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
         epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
         group.command(name, cls=cls, short_help=short, epilog=epilog)(verb)

@@ -15,8 +15,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
-from xosc_lateral.drivers.drives.cuts import MIN_RUN
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import MIN_RUN, Drive
 from xosc_lateral.drivers.model.plausibility import drives_nobody, implausible, implausible_rows
 from xosc_lateral.files.columns import (
     chosen_rows,

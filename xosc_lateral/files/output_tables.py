@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import hashlib
 import io
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import SIDECAR_SUFFIX
+from xosc_lateral.files.source import hash_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -66,7 +66,7 @@ def write_table(
         write_atomically(path, buffer.getvalue())
         return
     data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)
-    record = stamped(provenance) | {"sha256": hashlib.sha256(data).hexdigest()}
+    record = stamped(provenance) | {"sha256": hash_of(data)}
     write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
     write_atomically(path, data)
 

@@ -1,4 +1,4 @@
-"""The one gate through which input files are opened.
+"""The one gate through which input files are opened, and the hashes of files.
 
 Only regular files pass (a device or a fifo would be read for ever), only up to a size, and what is stated about a file
 afterwards is the hash of the bytes that were parsed: small files are read once into memory and hashed there, large ones
@@ -101,7 +101,7 @@ def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
         _guard(before)
         if before.st_size <= IN_MEMORY:
             data = file.read(IN_MEMORY + 1)
-            _remember(path, hashlib.sha256(data).hexdigest())
+            _remember(path, hash_of(data))
             yield Source(path, io.BytesIO(data), len(data))
             return
         yield Source(path, file, before.st_size)
@@ -205,6 +205,11 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
     what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)
+
+
+def hash_of(data: bytes) -> str:
+    """SHA-256 of a file's bytes, in hexadecimal: what provenance and manifests state of inputs and of outputs."""
+    return hashlib.sha256(data).hexdigest()
 
 
 def file_hash(path: Path) -> str:

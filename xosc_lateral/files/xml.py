@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import XML_TREE
-from xosc_lateral.files.source import check_regular, guard_input, open_source, read_source, state_key
+from xosc_lateral.files.source import check_regular, guard_input, hash_of, open_source, read_source, state_key
 from xosc_lateral.files.tables import unpacked_text
 
 MAX_CACHED_BYTES = 1_000_000  # larger files are read anew each time: catalogs are small, and 16 trees are kept
@@ -92,9 +91,14 @@ def read_xml(path: Path) -> tuple[etree._Element, bytes]:
     return document.root, document.data
 
 
-def document_of(data: bytes, path: Path) -> XmlDocument:
+def document_of(data: bytes, path: object) -> XmlDocument:
     """From bytes, as if they were that file's."""
-    return XmlDocument(parse_xml(data, path), data, hashlib.sha256(data).hexdigest())
+    return XmlDocument(parse_xml(data, path), data, hash_of(data))
+
+
+def line_of(xml: etree._Element) -> int | None:
+    """Line in the file, from 1; None for an element that was made, not read."""
+    return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there
 
 
 def root_tag(path: Path) -> str:

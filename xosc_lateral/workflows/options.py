@@ -32,6 +32,7 @@ NO_EGO = "none"
 """In place of a vehicle under test: there is none."""
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
+Settings = TypeVar("Settings", bound=type)
 
 Cell = Callable[[str, Path], Any]
 """Text of a table's cell and the table's folder -> what a user would say in Python."""
@@ -96,26 +97,43 @@ def declare_options(call: Verb) -> Verb:
 
     Keywords of a name in `SHARED` need no annotation where they have a default.
     """
-    options, entries = dict[str, Option](), list[str]()
-    documented, globals_ = inspect.cleandoc(call.__doc__ or ""), call.__globals__
+    options, kinds = dict[str, Option](), dict[str, str]()
+    globals_ = call.__globals__
     for name, parameter in inspect.signature(call).parameters.items():
         kind = parameter.annotation
         option = SHARED.get(name) if parameter.default is not parameter.empty else None
         if kind.startswith("Annotated["):
             kind, metadata = map(ast.unparse, ast.parse(kind, mode="eval").body.slice.elts)
             call.__annotations__[name], option = kind, eval(metadata, globals_)
-        if option is None:
-            continue
-        options[name] = option if option.kind is not None else replace(option, kind=eval(kind, globals_))
+        if option is not None:
+            options[name] = option if option.kind is not None else replace(option, kind=eval(kind, globals_))
+            kinds[name] = kind
+    call.__doc__ = _documented(call.__doc__ or "", options, kinds)
+    call.__options__ = options  # type: ignore[attr-defined]
+    return call
+
+
+def documented(settings: Settings) -> Settings:
+    """Settings whose docstring has an entry for each."""
+    kinds = {item.name: item.type for item in settable(settings)}
+    settings.__doc__ = _documented(settings.__doc__ or "", options_of(settings), kinds)
+    return settings
+
+
+def _documented(text: str, options: Mapping[str, Option], kinds: Mapping[str, Any]) -> str:
+    """A docstring with an entry for each option; what it does not say itself, the option's help says."""
+    documented, entries = inspect.cleandoc(text), list[str]()
+    for name, option in options.items():
         if not re.search(rf"^(\w+, )*{name}(, \w+)*( :|$)", documented, flags=re.MULTILINE):
-            text = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
-            entries.append(f"{name} : {kind}\n    {text}")
+            words = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
+            entries.append(f"{name} : {kinds[name]}\n    {words}")
+    if not entries:
+        return documented
     sections = re.split(r"\n\n(?=\w+\n---)", documented)
     if len(sections) == 1 or not sections[1].startswith("Parameters"):
         sections.insert(1, "Parameters\n----------")
     sections[1] = "\n".join([sections[1], *entries])
-    call.__doc__, call.__options__ = "\n\n".join(sections), options  # type: ignore[attr-defined]
-    return call
+    return "\n\n".join(sections)
 
 
 def settable(settings: type) -> list[Field[Any]]:
@@ -125,9 +143,13 @@ def settable(settings: type) -> list[Field[Any]]:
 
 def options_of(source: Callable[..., Any]) -> dict[str, Option]:
     """What users can set of some settings, or of a call, by name."""
-    if isinstance(source, type):
-        return {item.name: item.metadata["option"] for item in settable(source)}
-    return dict(source.__options__)  # type: ignore[attr-defined]
+    if not isinstance(source, type):
+        return dict(source.__options__)  # type: ignore[attr-defined]
+    options = {item.name: item.metadata["option"] for item in settable(source)}
+    for name, option in options.items():
+        if option.kind is None and (shared := SHARED.get(name)) is not None:
+            options[name] = replace(option, flags=shared.flags, kind=shared.kind, words=shared.words)
+    return options
 
 
 def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
@@ -209,6 +231,13 @@ def whole_number(smallest: int) -> Callable[[str | int], int]:
     return read
 
 
+def process_count(stated: int) -> int:
+    """How many processes work."""
+    if stated == 0 or stated < -1:
+        raise ValueError("at least 1, or -1 for one per core")
+    return stated
+
+
 def seconds(stated: str | float) -> float:
     """A length of time. [s]"""
     number = float(stated)
@@ -285,6 +314,8 @@ class Part(StrEnum):
 
 
 PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
+MAPPING = flag("--mapping", kind=Path | None, metavar="FILE.toml",
+    help="Saved mapping of columns (import table --propose FILE...).")  # fmt: skip
 
 # fmt: off
 SHARED: Mapping[str, Option] = {
@@ -301,6 +332,7 @@ SHARED: Mapping[str, Option] = {
         help='Folder with roads known by name ("Town04"); may be repeated.'),
     "time_limit": flag(kind=float | None, read=seconds, min=0.1, max=86_400, show_default=False,
         help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one."),
+    "jobs": flag(kind=int, read=process_count, help="Number of processes; -1: one per core."),
     "with_sensor": flag("--with", kind=list[Part] | None, read=bool,
         help="sensor: add the error of the sensor that measured the drives."),
 }

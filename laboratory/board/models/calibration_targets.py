@@ -14,8 +14,14 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.evaluation.measures import Features, differences, features_of
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import (
+    Features,
+    SnippetCondition,
+    Snippets,
+    differences,
+    features_of,
+    snippets_of,
+)
 
 FloatArray = NDArray[np.float64]
 

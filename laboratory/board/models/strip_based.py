@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from laboratory.board.models.batch import SegmentBatch
 from laboratory.board.models.calibration import Bounds, calibrate
 from laboratory.board.models.simulated import SimulatedModel, driver_means_of
-from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Run
 
 FloatArray = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.measures import band_power, differences, features_of
+from xosc_lateral.drivers.evaluation.snippets import band_power, differences, features_of
 
 QUICK = ["lane-centre", "constant", "gaussian-process"]
 

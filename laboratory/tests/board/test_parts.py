@@ -24,7 +24,7 @@ from tests.kit.profiles import simulated_profile
 from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import NotEnoughDataError, XoscLateralError
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.drivers.evaluation.snippets import LAGS, autocorrelation_of, resolved_bands
 
 RUNS = smooth_runs(24, 65.0)
 

@@ -14,7 +14,7 @@ from laboratory.board.models.catalogue import MODELS
 from laboratory.board.models.profiles import drives_of
 from tests.kit.runs import smooth_runs
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.drivers.model.sampled_offsets import cut_snippets, segment_of
 
 ELSEWHERE = {"sumo", "two-level-refined"}  # a program of its own, a search that takes its time: tested apart

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import LANE_CHANGE_MARGIN, all_runs, cut_runs, whole_run
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, all_runs, cut_runs, whole_run
 from xosc_lateral.drivers.drives.resampling import STEP, average, resample
 
 
@@ -66,8 +65,8 @@ def test_lane_changes_are_cut_with_their_margin(how: str) -> None:
     context = {"lane_index": np.where(time < 30.0, 0.0, 1.0)} if how == "lane_index" else {}
     runs = cut_runs(drive(time, offset, **context))
     assert len(runs) == 2
-    assert runs[0].time[-1] < 30.0 - LANE_CHANGE_MARGIN + 0.06
-    assert runs[1].time[0] > 30.0 + LANE_CHANGE_MARGIN - 0.06
+    assert runs[0].time[-1] < 30.0 - PAPER_RULES.lane_change_margin + 0.06
+    assert runs[1].time[0] > 30.0 + PAPER_RULES.lane_change_margin - 0.06
     assert all(len(set(run.offset.round(6))) == 1 for run in runs)  # nothing leaked across the cut
 
 

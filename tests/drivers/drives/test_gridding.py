@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import next_fast_len
 
-from xosc_lateral.drivers.drives.cuts import CutRules
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import CutRules, Drive
 from xosc_lateral.drivers.drives.gridding import circular_columns, grid_drives
 from xosc_lateral.drivers.drives.resampling import STEP
 

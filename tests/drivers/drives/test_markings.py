@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, cut_runs, lane_change_rows
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, cut_runs, lane_change_rows
 from xosc_lateral.drivers.drives.markings import Mended, both_markings
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.loop.identify import usable_columns

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
-from xosc_lateral.drivers.evaluation.measures import (
+from xosc_lateral.drivers.evaluation.metrics import METRICS
+from xosc_lateral.drivers.evaluation.snippets import (
     BANDS,
     FAMILIES,
     LAGS,
@@ -23,7 +24,6 @@ from xosc_lateral.drivers.evaluation.measures import (
     named_means,
     resolved_bands,
 )
-from xosc_lateral.drivers.evaluation.metrics import METRICS
 
 STEP = 0.2
 RNG = np.random.default_rng(1)

@@ -8,9 +8,8 @@ from msgspec.structs import replace
 
 from tests.kit.runs import smooth_runs
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.realism import Beside, Realism, score_realism
-from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -107,10 +106,3 @@ def test_a_floor_of_zero_has_no_ratio():
 
 def test_the_fade_of_the_papers_model_is_said(profile: DriverProfile):
     assert "raises diff. std" in start_fade_note(profile)
-
-
-def test_snippets_keep_their_place_when_some_are_taken(own: list[Run]):
-    cut = snippets_of(own, 10.0, STEP)
-    some = cut.take(np.array([2, 5]))
-    np.testing.assert_array_equal(some.offset, cut.offset[[2, 5]])
-    np.testing.assert_array_equal(some.cut_from([run.offset for run in own]), some.offset)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.evaluation.measures import windows_with_the_same_start
 from xosc_lateral.drivers.evaluation.metrics import energy_score, metric_distances, snippet_metrics, variogram_score
+from xosc_lateral.drivers.evaluation.snippets import windows_with_the_same_start
 
 
 def _paths(n: int, rng: np.random.Generator, *, keep: float = 0.995, spread: float = 0.3) -> np.ndarray:

@@ -7,8 +7,8 @@ import pytest
 
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.sizes import (
-    LEVEL,
     QUANTITIES,
+    SIGNIFICANCE_LEVEL,
     SLOW_S,
     Sizes,
     differences,
@@ -52,7 +52,9 @@ def test_ten_per_cent_and_a_hand_are_told_apart_and_the_same_driver_is_not() -> 
         [differences(two_drives(seed), two_drives(100 + seed, **change)) for seed in range(pairs)]
         for change in ({}, {"scale": 1.1}, {"shift": 0.12})
     )
-    told = [sum(min(part.p_value for part in parts) <= LEVEL for parts in case) for case in (same, wide, left)]
+    told = [
+        sum(min(part.p_value for part in parts) <= SIGNIFICANCE_LEVEL for parts in case) for case in (same, wide, left)
+    ]
     assert told[0] <= 3  # a binomial of 5 % is above 3 of 20 in 2 % of cases
     assert told[1] >= 18
     assert told[2] >= 18

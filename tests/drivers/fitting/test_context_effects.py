@@ -9,8 +9,7 @@ import pytest
 
 from tests.kit.runs import made_run, smooth_runs
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import CutRules
-from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.drive import CutRules, Drive, Run
 from xosc_lateral.drivers.fitting.context_effects import (
     FADING_DISTANCE,
     LEAST_DRIVES,
@@ -19,7 +18,7 @@ from xosc_lateral.drivers.fitting.context_effects import (
     without_effects,
 )
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_profile
-from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
+from xosc_lateral.drivers.model.core.autoregressive.parameters import split_bands
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.drivers.model.sampled_offsets import segment_of
 from xosc_lateral.drivers.model.sampling import sample_offsets

@@ -22,7 +22,7 @@ from xosc_lateral.drivers.model.sampling import sample_offsets
 @pytest.fixture(autouse=True)
 def _few_drives(monkeypatch: pytest.MonkeyPatch) -> None:
     """An eighth of the driving: errors are three times as large, and seeds are fixed."""
-    monkeypatch.setattr(deriving, "DRIVES", 30)
+    monkeypatch.setattr(deriving, "DRIVE_COUNT", 30)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_sdlp_mean_and_restlessness_are_those_of_the_offsets(base: DriverProfile
 
 
 def test_share_near_a_line_counts_the_vehicles_sides(base: DriverProfile, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(deriving, "DRIVES", 120)  # a share of rare rows needs more of them
+    monkeypatch.setattr(deriving, "DRIVE_COUNT", 120)  # a share of rare rows needs more of them
     made = derive(base, Asked(near_line=0.04), "x").profile
     limit = 0.5 * base.lane_width - 0.9 - 0.2
     assert (np.abs(_hours(made, 70, 40)) > limit).mean() == pytest.approx(0.04, rel=0.06)

@@ -24,8 +24,7 @@ from xosc_lateral.drivers.fitting.bands import (
     visible_below,
     with_fast_part,
 )
-from xosc_lateral.drivers.fitting.fitting import fit_profile
-from xosc_lateral.drivers.fitting.warnings import smoothed_above
+from xosc_lateral.drivers.fitting.fitting import fit_profile, smoothed_above
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.sensor import SensorModel

@@ -12,7 +12,7 @@ import pytest
 from examples.driver_simulator.simulator import simulate_drive
 from tests.kit.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.drives.cuts import all_runs
+from xosc_lateral.drivers.drives.drive import all_runs
 from xosc_lateral.drivers.evaluation.snippets import sample_runs
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import parse_map

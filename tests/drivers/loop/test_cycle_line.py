@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from xosc_lateral.drivers.loop.terms.cycle import PERIODS_S, WIDTHS, _line
+from xosc_lateral.drivers.loop.terms.hidden import PERIODS_S, WIDTHS, _line
 
 N = 3000
 """Whitened seconds: 50 min."""

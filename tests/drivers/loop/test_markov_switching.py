@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from xosc_lateral.drivers.loop.terms.regimes import fit_regimes, forward_backward
+from xosc_lateral.drivers.loop.terms.hidden import fit_regimes, forward_backward
 
 
 def all_paths(rows: np.ndarray, valid: np.ndarray, quiet: float, loud: float, go: float, leave: float):

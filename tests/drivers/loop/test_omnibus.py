@@ -9,7 +9,7 @@ from tests.kit.coarse import STEP, coarse_of, movement, wander
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.model import fit_model
-from xosc_lateral.drivers.loop.omnibus import DELAYS, LEVEL, check_remainder, tents
+from xosc_lateral.drivers.loop.omnibus import LEVEL, check_remainder, tents
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET
 from xosc_lateral.drivers.loop.timeline import Coarse
 
@@ -34,15 +34,15 @@ def checked(coarse: Coarse, seed: int = 1) -> tuple[float, tuple[str, ...], floa
 
 
 def test_kernels_have_gain_one_and_are_as_late_as_they_say() -> None:
-    ramp = tents(np.arange(200.0), DELAYS, DRIVE)
+    ramp = tents(np.arange(200.0), DRIVE)
     assert ramp[100:120, 4] == pytest.approx(np.arange(100.0, 120.0)[:, None][:, 0] - 3.0, abs=0.5)
-    assert tents(np.ones(200), DELAYS, DRIVE) == pytest.approx(1.0)
+    assert tents(np.ones(200), DRIVE) == pytest.approx(1.0)
 
 
 def test_kernels_never_reach_into_another_drive() -> None:
     values, drives = np.repeat([0.0, 1.0], 100), np.repeat([0, 1], 100)
-    assert tents(values, DELAYS, drives)[:, 0] == pytest.approx(values)
-    assert tents(values, DELAYS, drives)[:, -1] == pytest.approx(values)
+    assert tents(values, drives)[:, 0] == pytest.approx(values)
+    assert tents(values, drives)[:, -1] == pytest.approx(values)
 
 
 def test_a_course_without_gain_is_seen_where_it_is_all_there_is() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.drivers.loop.terms.regimes import probability_of_persistence
+from xosc_lateral.drivers.loop.terms.hidden import probability_of_persistence
 from xosc_lateral.drivers.loop.terms.spread import Squares
 
 N = 3000

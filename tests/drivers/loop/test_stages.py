@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, STAGES, TERMS
-from xosc_lateral.drivers.loop.terms.cycle import CycleTerm
+from xosc_lateral.drivers.loop.terms.hidden import CycleTerm, RegimesTerm
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.terms.regimes import RegimesTerm
 from xosc_lateral.drivers.loop.terms.spread import SpreadTerm
 from xosc_lateral.drivers.loop.terms.time import TimeMeanTerm
 

@@ -10,6 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION
+from tests.kit.schema import profile_schema
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import Acts, Drift, Linear
 from xosc_lateral.drivers.model.profile import (
@@ -17,7 +18,6 @@ from xosc_lateral.drivers.model.profile import (
     DriverProfile,
     Metadata,
     Provenance,
-    profile_schema,
     sampling_hash,
 )
 from xosc_lateral.drivers.model.sensor import SensorModel

@@ -12,8 +12,7 @@ import xosc_lateral as xl
 from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive, simulated_profile
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import all_runs, lane_change_rows
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive, all_runs, lane_change_rows
 from xosc_lateral.drivers.model.sampled_offsets import cut_snippets, sample_context, sample_free, sample_like
 from xosc_lateral.drivers.model.validity import Validity
 from xosc_lateral.files.drives import read_drives

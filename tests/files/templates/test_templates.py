@@ -13,7 +13,7 @@ from lxml import etree
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.cli import main
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.templates import TEMPLATES, Template, find_template
 from xosc_lateral.files.templates.parameter import Number
 

@@ -12,7 +12,7 @@ from tests.kit.made.conditions import CONDITIONS
 from tests.kit.made.roads import ROADS
 from tests.kit.made.stage import Stage
 from tests.kit.made.xml import element
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 
 LAST = 14.0
 """When a scenario ends. [s]"""

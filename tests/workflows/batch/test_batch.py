@@ -19,7 +19,7 @@ import pytest
 from tests.kit.fake_converter import convert, convert_and_log
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import file_hash
-from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
+from xosc_lateral.workflows.batch.batch import STATE_FOLDER, BatchStoppedError, JobOutcome, JobState, convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Job, plan_batch
 from xosc_lateral.workflows.batch.journal import FolderInUseError, folder_lock
@@ -268,7 +268,7 @@ def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, 
             for _ in range(rng.randint(1, 12)):
                 process.stdout.readline()
             process.kill()
-    runs = json.loads((out / STATE / "lock").read_text())["runs"]
+    runs = json.loads((out / STATE_FOLDER / "lock").read_text())["runs"]
     assert len(runs) == 3
     for killed in runs:  # what a kill in the middle of writing leaves
         (out / f".000.{killed}-0123abcd.tmp.xosc").write_text("half")
@@ -285,11 +285,11 @@ def test_a_journal_cut_anywhere_is_good_up_to_its_last_whole_line(tmp_path: Path
     for _ in range(3):
         next(outcomes)
     outcomes.close()  # type: ignore[attr-defined]
-    journal = out / STATE / "journal.jsonl"
+    journal = out / STATE_FOLDER / "journal.jsonl"
     whole = journal.read_bytes()
     run(inputs, tmp_path / "calm")
     for cut in (0, 1, len(whole) // 2, len(whole) - 1, len(whole)):
-        (out / STATE).mkdir(exist_ok=True)
+        (out / STATE_FOLDER).mkdir(exist_ok=True)
         journal.write_bytes(whole[:cut])
         (out / MANIFEST).unlink(missing_ok=True)
         run(inputs, out)
@@ -348,11 +348,11 @@ def test_a_second_run_into_a_busy_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_lock_of_a_dead_process_is_no_obstacle(tmp_path: Path) -> None:
-    (tmp_path / STATE).mkdir()
-    (tmp_path / STATE / "lock").write_text('{"pid": 1, "host": "elsewhere"}')
-    with folder_lock(tmp_path / STATE / "lock"):
-        assert str(os.getpid()) in (tmp_path / STATE / "lock").read_text()
-    assert not (tmp_path / STATE / "lock").exists()
+    (tmp_path / STATE_FOLDER).mkdir()
+    (tmp_path / STATE_FOLDER / "lock").write_text('{"pid": 1, "host": "elsewhere"}')
+    with folder_lock(tmp_path / STATE_FOLDER / "lock"):
+        assert str(os.getpid()) in (tmp_path / STATE_FOLDER / "lock").read_text()
+    assert not (tmp_path / STATE_FOLDER / "lock").exists()
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write anywhere")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tests.workflows.batch.test_manifest import ROW
-from xosc_lateral.workflows.batch.convert_job import batch_page
+from xosc_lateral.workflows.batch.call import batch_page
 
 CALM = replace(ROW, output="calm.xosc", gap_before=2.0, gap_after=1.9, warnings=(), error="")
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import signal
 from collections.abc import Iterator
+from concurrent.futures import Future
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -52,6 +55,27 @@ def test_a_scenario_that_kills_every_worker_costs_one_row(tmp_path: Path, cluste
     outcomes = list(convert_many(plan_batch([inputs], tmp_path / "out"), cluster=cluster, converter=convert))
     assert [name for name, state in states(outcomes).items() if state is JobState.FAILED] == ["killer.xosc"]
     assert len(outcomes) == 5
+
+
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_a_result_that_comes_as_its_worker_dies_is_lost_and_not_a_bug(is_lost: bool) -> None:
+    async def result_of(*, raiseit: bool) -> object:
+        try:
+            raise ValueError("a bug")
+        except ValueError as error:
+            return "a result" if is_lost else (type(error), error, error.__traceback__)
+
+    future: Future[object] = Future()
+    theirs = SimpleNamespace(_result=result_of, status="lost")
+
+    async def cascade() -> None:
+        await distributed.cfexecutor._cascade_future(theirs, future)
+
+    asyncio.run(cascade())
+    pool = object.__new__(dask_cluster._Cluster)
+    pool._client = SimpleNamespace(status="running")
+    error = future.exception()
+    assert error is not None and pool.lost(error) is is_lost
 
 
 def test_no_scheduler_at_the_address_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,7 @@ from tests.kit.fake_converter import convert
 from tests.workflows.batch.test_batch import ROOT, make_inputs, run
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.atomic import files_of_run, replace_atomically
-from xosc_lateral.workflows.batch.batch import STATE, BatchStoppedError, JobState, convert_many
+from xosc_lateral.workflows.batch.batch import STATE_FOLDER, BatchStoppedError, JobState, convert_many
 from xosc_lateral.workflows.batch.jobs import plan_batch
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX links and signals")
@@ -49,7 +49,7 @@ def test_modules_in_the_folder_of_scenarios_never_run(tmp_path: Path, how: str) 
     assert len(list((tmp_path / "out").glob("*.xosc"))) == 2
 
 
-@pytest.mark.parametrize("name", [f"{STATE}/lock", f"{STATE}/journal.jsonl", STATE])
+@pytest.mark.parametrize("name", [f"{STATE_FOLDER}/lock", f"{STATE_FOLDER}/journal.jsonl", STATE_FOLDER])
 @pytest.mark.parametrize("kind", ["link", "hard link", "fifo"])
 def test_state_files_that_lead_elsewhere_are_refused(tmp_path: Path, name: str, kind: str) -> None:
     inputs, out, victim = make_inputs(tmp_path / "in", 1), tmp_path / "out", tmp_path / "folder" / "lock"
@@ -60,7 +60,7 @@ def test_state_files_that_lead_elsewhere_are_refused(tmp_path: Path, name: str, 
     if kind == "fifo":
         os.mkfifo(place)
     elif kind == "link":
-        place.symlink_to(victim.parent if name == STATE else victim)
+        place.symlink_to(victim.parent if name == STATE_FOLDER else victim)
     else:
         os.link(victim, place)
     with pytest.raises(xl.XoscLateralError, match=re.escape(str(place))) as error:
@@ -91,9 +91,9 @@ def test_a_link_in_place_of_a_folder_of_outputs_or_pages_is_not_followed(tmp_pat
 
 def test_a_run_leaves_the_temporary_files_of_others_alone_and_removes_those_of_killed_ones(tmp_path: Path) -> None:
     inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
-    (out / STATE).mkdir(parents=True)
+    (out / STATE_FOLDER).mkdir(parents=True)
     others, killed = "0123456789ab", "ba9876543210"
-    (out / STATE / "lock").write_text(json.dumps({"pid": 1, "host": "x", "runs": [killed, "../..", 5]}))
+    (out / STATE_FOLDER / "lock").write_text(json.dumps({"pid": 1, "host": "x", "runs": [killed, "../..", 5]}))
     left: list[Path] = []
     for name in (others, killed):
         with files_of_run(name), pytest.raises(OSError, match=r"a\.xosc"):
@@ -126,8 +126,8 @@ def test_a_folder_that_is_up_to_date_need_not_be_written(tmp_path: Path, monkeyp
 STOPPED_RUN = """
 import sys
 from tests.kit.fake_converter import convert
-from xosc_lateral.workflows.batch import convert_job
-convert_job.convert_job = convert
+from xosc_lateral.workflows.batch import batch
+batch.convert_job = convert
 from xosc_lateral.cli import main
 main(None)
 """

@@ -18,7 +18,7 @@ from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
 from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.scenario import Action
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
 PROFILE = Neighbours.PROFILE
 
@@ -58,7 +58,9 @@ def test_a_curve_cutter_moves_to_the_inside_ahead_of_the_curve(tmp_path: Path) -
     # the curve begins at once, and is seen over a second or two: a response to a normal distribution of beginnings
     share = np.linspace(-4.0, 4.0, 401)
     seen = np.exp(-0.5 * share**2) / np.exp(-0.5 * share**2).sum()
-    risen = sum(part * _risen(time, 8.0 - LOOK_AHEAD + STEERING * when) for part, when in zip(seen, share, strict=True))
+    risen = sum(
+        part * _risen(time, 8.0 - LOOK_AHEAD + STEERING_DURATION * when) for part, when in zip(seen, share, strict=True)
+    )
     expected = SIZE * risen
     np.testing.assert_allclose(moved, expected, atol=0.06 * SIZE)  # 5 Hz: the step is known to a sample
 

@@ -19,7 +19,7 @@ from xosc_lateral.workflows.conversion.enrich import enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.motion.trajectory import distance_driven
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
 PROFILE = Neighbours.PROFILE
 
@@ -158,7 +158,7 @@ def test_an_effect_sees_the_context_around_its_segment_and_acts_in_it(tmp_path: 
     for with_effect, without in zip(shifted.segments, plain.segments, strict=True):
         # looked ahead by a second, beyond the segment too; the curve begins at once, and is seen over a second or two
         since = with_effect.time + 1.0 - 10.0
-        expected = np.array([0.5 + 0.5 * erf(one / STEERING / sqrt(2.0)) for one in since]) / (400.0 + 5.25)
+        expected = np.array([0.5 + 0.5 * erf(one / STEERING_DURATION / sqrt(2.0)) for one in since]) / (400.0 + 5.25)
         np.testing.assert_allclose(
             with_effect.offset - without.offset, expected, atol=0.05 / 400.0
         )  # 5 Hz: half a step

@@ -17,7 +17,7 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.detection.command import Command
 from xosc_lateral.workflows.detection.detectors import WanderingZone
-from xosc_lateral.workflows.detection.observation import PERFECT, Sensor, views_of
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor, views_of
 from xosc_lateral.workflows.detection.scoring import Tally
 from xosc_lateral.workflows.detection.sources import SourceSettings, sources_of
 from xosc_lateral.workflows.detection.tracks import STEP
@@ -55,7 +55,7 @@ def made_scene():
     return scene(track(0.5 * np.sin(time) + lane_change(time, 15.0, 5.0)), track(0.0 * time, name="B", lane=0, x=30.0))
 
 
-@pytest.mark.parametrize("sensor", [PERFECT, Sensor(noise=0.05, delay=0.1, rate=10.0)])
+@pytest.mark.parametrize("sensor", [PERFECT_SENSOR, Sensor(noise=0.05, delay=0.1, rate=10.0)])
 def test_a_program_with_the_rule_of_a_built_in_one_scores_the_same(sensor, tmp_path):
     made = made_scene()
     views = views_of(made, sensor, 0)
@@ -94,7 +94,7 @@ def test_a_program_in_another_language_alarms_where_the_states_of_three_sources_
         road = Path("cut-in.xodr") if path == "states.csv" else None
         (source,) = sources_of(Path(path), SourceSettings(road=road, ego="none"))
         (one,) = source.scenes()
-        views = views_of(one, PERFECT, 0)
+        views = views_of(one, PERFECT_SENSOR, 0)
         for view, score in zip(views, Command(awk(tmp_path)).scores(one, views), strict=True):
             if view.track.name == "CutIn":
                 known = np.array([offsets[moment] for moment in view.track.time.round(3).tolist()])
@@ -129,7 +129,7 @@ ANSWER = "import sys\nfor line in sys.stdin:\n    print({!r}, flush=True)\n"
 def test_what_a_program_does_wrong_is_one_line_with_the_step(text, what, tmp_path):
     made = made_scene()
     with pytest.raises(SimulationError, match=what) as caught:
-        Command(python(tmp_path, text), answer_time=0.3).scores(made, views_of(made, PERFECT, 0))
+        Command(python(tmp_path, text), answer_time=0.3).scores(made, views_of(made, PERFECT_SENSOR, 0))
     assert "\n" not in str(caught.value)
 
 

@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from tests.kit.lane_tracks import lane_change, scene, track, weave
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.workflows.detection.logistic import PENALTY, Logistic, features, fit_regression, train
-from xosc_lateral.workflows.detection.observation import PERFECT, views_of
+from xosc_lateral.workflows.detection.logistic import RIDGE_PENALTY, Logistic, features, fit_regression, train
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, views_of
 from xosc_lateral.workflows.detection.scoring import Tally
 
 TIME = 0.1 * np.arange(900)
@@ -25,7 +25,7 @@ def test_the_fit_is_the_minimum_that_a_general_optimiser_finds():
 
     def loss(beta):
         odds = beta[0] + standard @ beta[1:]
-        return (weight * np.logaddexp(0.0, np.where(positive, -odds, odds))).sum() + 0.5 * PENALTY * (
+        return (weight * np.logaddexp(0.0, np.where(positive, -odds, odds))).sum() + 0.5 * RIDGE_PENALTY * (
             beta[1:] ** 2
         ).sum()
 
@@ -41,7 +41,7 @@ def drivers(amplitude: float, count: int = 6, first: int = 0) -> list:
 
 
 def trained(scenes) -> Logistic:
-    return train((view for one in scenes for view in views_of(one, PERFECT, 0)), 0.5, "made")
+    return train((view for one in scenes for view in views_of(one, PERFECT_SENSOR, 0)), 0.5, "made")
 
 
 def test_trained_on_lane_centre_traffic_it_takes_every_weave_for_a_cut_in_and_on_weaving_traffic_it_does_not():
@@ -49,7 +49,7 @@ def test_trained_on_lane_centre_traffic_it_takes_every_weave_for_a_cut_in_and_on
     for amplitude in (0.0, 0.25):
         tally = Tally(trained(drivers(amplitude)), "made")
         for one in drivers(0.25, first=20):
-            tally.add(one, views_of(one, PERFECT, 0))
+            tally.add(one, views_of(one, PERFECT_SENSOR, 0))
         curve = tally.curve()
         rates.append(float(curve.rate[curve.detector.chosen]))
         shares.append(float(curve.in_time[curve.detector.chosen]))
@@ -63,7 +63,7 @@ def test_separable_classes_have_finite_coefficients():
 
 
 def test_features_are_positive_towards_the_lane_on_either_side():
-    views = views_of(scene(track(lane_change(TIME, 40.0, 6.0))), PERFECT, 0)
+    views = views_of(scene(track(lane_change(TIME, 40.0, 6.0))), PERFECT_SENSOR, 0)
     left, right = (features(view) for view in views)
     np.testing.assert_allclose(left[:, :4], -right[:, :4])
     np.testing.assert_allclose(left[:, 4:], right[:, 4:])

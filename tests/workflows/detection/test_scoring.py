@@ -7,12 +7,12 @@ import pytest
 
 from tests.kit.lane_tracks import LANE, lane_change, scene, track, weave
 from xosc_lateral.workflows.detection.detectors import LateralSpeed, MarkingDistance, WanderingZone
-from xosc_lateral.workflows.detection.observation import PERFECT, RATE_WINDOW, Sensor, views_of
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, RATE_WINDOW, Sensor, views_of
 from xosc_lateral.workflows.detection.scoring import Tally, count_onsets, lead_times
-from xosc_lateral.workflows.detection.tracks import MARGIN, STEP, LaneChange
+from xosc_lateral.workflows.detection.tracks import MARGIN_ROWS, STEP, LaneChange
 
 
-def curve_of(detector, *scenes, sensor=PERFECT):
+def curve_of(detector, *scenes, sensor=PERFECT_SENSOR):
     tally = Tally(detector, "made")
     for one in scenes:
         tally.add(one, views_of(one, sensor, 0))
@@ -38,7 +38,7 @@ def test_lead_times_are_those_of_a_loop_over_rows():
         for limit, lead in zip(limits.tolist(), lead_times(score, change, limits).tolist(), strict=True):
             row = 60
             if score[row] > limit:  # it stands: since when
-                while row > 60 - MARGIN and score[row - 1] > limit:
+                while row > 60 - MARGIN_ROWS and score[row - 1] > limit:
                     row -= 1
             else:
                 row = next((k for k in range(60, 111) if score[k] > limit), -1)
@@ -84,7 +84,7 @@ def test_an_ego_hears_of_its_own_lane_alone():
     beside = track(lane_change(time, 25.0, 6.0), name="A", lane=0, x=40.0)
     behind = track(lane_change(time, 25.0, 6.0), name="B", lane=0, x=-60.0)
     away = track(lane_change(time, 25.0, 6.0), name="C", lane=1, x=300.0)
-    views = views_of(scene(ego, beside, behind, away, ego="Ego"), PERFECT, 0)
+    views = views_of(scene(ego, beside, behind, away, ego="Ego"), PERFECT_SENSOR, 0)
     assert [(view.track.name, view.side) for view in views] == [("A", 1)]
     curve = curve_of(LateralSpeed(), scene(ego, beside, behind, away, ego="Ego"))
     assert len(curve.leads) == 1
@@ -97,7 +97,7 @@ def test_an_ego_hears_of_its_own_lane_alone():
 def test_without_an_ego_the_nearest_behind_in_the_next_lane_looks_on():
     one, near, far = (track(np.zeros(200), name=name, lane=lane, x=x) for name, lane, x in (
         ("A", 1, 100.0), ("near", 2, 70.0), ("far", 2, 10.0)))  # fmt: skip
-    views = [view for view in views_of(scene(one, near, far), PERFECT, 0) if view.track.name == "A"]
+    views = [view for view in views_of(scene(one, near, far), PERFECT_SENSOR, 0) if view.track.name == "A"]
     gaps = {view.side: view.observer.gap[50] for view in views if view.observer is not None}
     assert gaps[1] == pytest.approx(30.0 - 4.6) and np.isnan(gaps[-1])
 

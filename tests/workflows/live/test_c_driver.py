@@ -27,12 +27,12 @@ from xosc_lateral.drivers.model.effects import (
     Product,
     Threshold,
 )
-from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.workflows.live.c_driver import export_c
+from xosc_lateral.workflows.live.c_driver import c_sources, export_c
 from xosc_lateral.workflows.live.c_numbers import numbers_of
 
 SHIPPED = sorted(path.stem for path in (Path(__file__).resolve().parents[3] / "driver_profiles").glob("*.json"))
@@ -286,6 +286,23 @@ def test_drivers_that_differ_much_and_vary_within_minutes_are_as_in_the_batch_ca
         assert compared(driver, profile, 60, seed) < TOLERANCE
         means.append(driver.step(60.0, row_of(varying(driver.columns, 1, 1), 0))[0])
     assert np.ptp(means) > 1.5
+
+
+def test_header_and_numbers_state_the_profiles_name_and_licences() -> None:
+    profile = read_profile("motorway")
+    licence = profile.metadata.licence
+    assert licence
+    files = c_sources(profile)
+    for name in ("driver_motorway.h", "driver_motorway_profile.h"):
+        comment = " ".join(files[name].partition("*/")[0].replace("\n *", "").split())
+        assert "Driver motorway of xosc-lateral" in comment
+        assert f"Licence of the profile: {licence}" in comment
+        assert profile.provenance.licence[:60] in comment
+    silent = replace(profile, metadata=replace(profile.metadata, licence=""), provenance=Provenance())
+    assert "Licence" not in c_sources(silent)["driver_motorway.h"]
+    odd = replace(silent, metadata=replace(profile.metadata, licence="\u00e4 */ int x; /* //* https://a.b/*"))
+    assert c_sources(odd)["driver_motorway.h"].count("*/") == c_sources(silent)["driver_motorway.h"].count("*/")
+    assert c_sources(odd)["driver_motorway.h"].count("/*") == c_sources(silent)["driver_motorway.h"].count("/*")
 
 
 def test_columns_of_any_name_have_fields_in_c(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import xosc_lateral as xl
 from tests.kit.sumo_run import write_run
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.cli import main
-from xosc_lateral.cli.live import FCD
+from xosc_lateral.cli.live import FCD_COLUMNS
 
 pytest.importorskip("libsumo", reason="the extra sumo is not installed")
 pytest.importorskip("sumo", reason="the extra sumo is not installed")
@@ -96,7 +96,14 @@ def test_lane_changes_stay_sumos_and_the_spread_its_drivers(run: Path) -> None:
 
     from xosc_lateral.workflows.live.sumo import start
 
-    words = ["-c", str(run / "run.sumocfg"), "--fcd-output", str(run / "alone.xml"), "--fcd-output.attributes", FCD]
+    words = [
+        "-c",
+        str(run / "run.sumocfg"),
+        "--fcd-output",
+        str(run / "alone.xml"),
+        "--fcd-output.attributes",
+        FCD_COLUMNS,
+    ]
     sumo = start(words)
     while sumo.simulation.getTime() < END:
         sumo.simulationStep()

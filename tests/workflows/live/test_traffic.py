@@ -15,7 +15,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import sealed
-from xosc_lateral.workflows.live.paths import TURN, Moves
+from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, Moves
 from xosc_lateral.workflows.live.traffic import FORMAT, Moment, Traffic
 from xosc_lateral.workflows.profiles.profiles import read_profile
 
@@ -86,7 +86,7 @@ def test_a_maneuver_gives_the_car_back_without_a_kink(profile: DriverProfile, sp
     back = drive(traffic, 12.0, 7.01, **at, **fast)
     assert last.offset[0] == where
     assert abs(back[0].offset[0] - where) < 2e-3
-    assert turns([last, *back], speed).max() < TURN * DT
+    assert turns([last, *back], speed).max() < LARGEST_TURN_RATE * DT
     other = drive(Traffic(profile, seed=2), 19.01, **fast)  # and the driver is where he had been without a maneuver
     np.testing.assert_allclose(column(back, "offset")[-200:], column(other, "offset")[-200:], atol=1e-9)
 
@@ -110,7 +110,7 @@ def test_slow_cars_move_less_and_standing_ones_not_at_all(profile: DriverProfile
         k += 1
         time = k * DT
     assert np.abs(np.diff(column(moves, "offset"))).max() < 0.01
-    assert np.abs(np.diff(column(moves, "heading"))).max() < TURN * DT
+    assert np.abs(np.diff(column(moves, "heading"))).max() < LARGEST_TURN_RATE * DT
     other = drive(Traffic(profile, seed=4), 40.0)
     rest = drive(traffic, 6.0, time, offset=moves[-1].offset)
     assert column(rest, "offset")[-1] == pytest.approx(column(other, "offset")[-1], abs=0.05)  # speed 6 s ago

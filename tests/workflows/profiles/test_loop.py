@@ -37,7 +37,13 @@ from xosc_lateral.drivers.model.effects import (
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.pages.chart import Panel
 from xosc_lateral.workflows.profiles.loop_curves import curve_of, moving_spread
-from xosc_lateral.workflows.profiles.loop_figures import DRAWINGS, DRIVES, draw_spectra, effect_figure, residual_figure
+from xosc_lateral.workflows.profiles.loop_figures import (
+    DRAWINGS,
+    DRIVES_COLOR,
+    draw_spectra,
+    effect_figure,
+    residual_figure,
+)
 from xosc_lateral.workflows.profiles.loop_json import column_record, finding_record, finite, loop_record
 from xosc_lateral.workflows.profiles.loop_page import finding_sentence, loop_page, loop_text
 from xosc_lateral.workflows.profiles.loop_words import (
@@ -204,7 +210,7 @@ def test_every_hidden_effect_has_a_picture_with_the_measured_drive_in_it(result:
     figure = draw(result, hidden(result, effect, "periodic"))
     lines = [mark for panel in figure.panels for mark in panel.curves()]
     assert caption.endswith(".")
-    assert any(line.color == DRIVES and len(line.x) > 50 for line in lines)
+    assert any(line.color == DRIVES_COLOR and len(line.x) > 50 for line in lines)
 
 
 @pytest.mark.parametrize("kind", ["memory", "population"])

@@ -10,7 +10,7 @@ import pytest
 
 from tests.kit.coarse import coarse_of, movement
 from xosc_lateral.drivers.loop.model import fit_model
-from xosc_lateral.drivers.loop.terms.regimes import RegimeFit, RegimesTerm
+from xosc_lateral.drivers.loop.terms.hidden import RegimeFit, RegimesTerm
 from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.workflows.profiles.loop_curves import (
     hidden_mean,

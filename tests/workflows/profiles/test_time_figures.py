@@ -9,7 +9,7 @@ from tests.kit.enriched import made_enriched
 from xosc_lateral.files.pages.chart import Panel, color_of
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.playing.figures import (
-    COMFORTABLE,
+    USUAL_ACCELERATION,
     accelerations_over_time,
     broken,
     offsets_over_time,
@@ -67,7 +67,7 @@ def test_accelerations_are_what_was_added_between_the_bounds_of_real_drivers(enr
     for number, (panel, one) in enumerate(zip(panels, enriched.entities, strict=True)):
         np.testing.assert_allclose(lines(panel)["added"][:, 1], one.lateral_acceleration()[shown_rows(one.motion)])
         levels = {float(mark.y[0]) for mark in panel.marks if mark.dashes}
-        assert levels == {-COMFORTABLE, COMFORTABLE}
+        assert levels == {-USUAL_ACCELERATION, USUAL_ACCELERATION}
         assert [mark.color for mark in panel.marks if mark.label == "added"] == [color_of(number)]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.recordings import WIDTH, write_mf4
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.drivers.drives.cuts import cut_runs
+from xosc_lateral.drivers.drives.drive import cut_runs
 from xosc_lateral.files.drives import drives_of_table
 from xosc_lateral.workflows.recordings.importers import ImportedDrives
 from xosc_lateral.workflows.recordings.importers.mf4 import import_mf4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.workflows.recordings.test_importers import _dlr_recording
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.workflows.recordings.recorded import place_tracks
 from xosc_lateral.workflows.recordings.recordings import format_of, read_recording

@@ -14,16 +14,15 @@ from hypothesis import strategies as st
 
 from xosc_lateral.world.motion.gaps import box_distance
 from xosc_lateral.world.player.actions.speed_profile import limits_of
-from xosc_lateral.world.player.boxes import (
+from xosc_lateral.world.player.distances import (
     HEIGHT_APART,
+    box_gaps,
     corners,
     distance_between,
-    gaps,
     holds_point,
     overlap,
 )
-from xosc_lateral.world.player.simulation import TrafficSignals
-from xosc_lateral.world.player.values import Values, holds
+from xosc_lateral.world.player.simulation import TrafficSignals, Values, holds
 from xosc_lateral.world.road.positions import Pose
 from xosc_lateral.world.scenario.entity import BoundingBox, Performance
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
@@ -76,21 +75,21 @@ def test_boxes_on_different_levels_do_not_touch() -> None:
     ],
 )
 def test_gaps_are_positive_ahead_and_to_the_left(x: float, y: float, expected: tuple[float, float]) -> None:
-    assert gaps(corners(car()), corners(car(x, y)), 0.0) == pytest.approx(expected)
+    assert box_gaps(corners(car()), corners(car(x, y)), 0.0) == pytest.approx(expected)
 
 
 def test_gaps_turn_with_the_entity_that_asks() -> None:
     """Heading north: what is north of it is ahead, what is west of it on the left."""
     own = car(heading=pi / 2.0, centre=0.0)
-    assert gaps(corners(own), corners(car(0.0, 10.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((6.0, 0.0))
-    assert gaps(corners(own), corners(car(-5.0, 0.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((0.0, 3.0))
+    assert box_gaps(corners(own), corners(car(0.0, 10.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((6.0, 0.0))
+    assert box_gaps(corners(own), corners(car(-5.0, 0.0, pi / 2.0, centre=0.0)), -pi / 2.0) == pytest.approx((0.0, 3.0))
 
 
 def test_gaps_in_a_turned_frame() -> None:
     square = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
     there = tuple((x + 5.0, y + 5.0) for x, y in square)
-    assert gaps(square, there, 0.0) == pytest.approx((3.0, 3.0))
-    along, across = gaps(square, there, -pi / 4.0)  # along the diagonal between them
+    assert box_gaps(square, there, 0.0) == pytest.approx((3.0, 3.0))
+    along, across = box_gaps(square, there, -pi / 4.0)  # along the diagonal between them
     assert along == pytest.approx(hypot(5.0, 5.0) - 2.0 * hypot(1.0, 1.0))
     assert across == 0.0
 

@@ -10,8 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from xosc_lateral.files.openscenario.actions import PRIVATE_ACTIONS
-from xosc_lateral.files.openscenario.conditions import ENTITY_CONDITIONS, VALUE_CONDITIONS
+from xosc_lateral.files.openscenario.storyboard import ENTITY_CONDITIONS, PRIVATE_ACTIONS, VALUE_CONDITIONS
 from xosc_lateral.world.player.actions.at_once import (
     RunningForTime,
     controller,

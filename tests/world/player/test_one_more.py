@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from tests.kit.stage import Stage, by_entity, entity, event, maneuvers, private_action, row, start_of, when
-from xosc_lateral.files.openscenario import actions as action_readers
-from xosc_lateral.files.openscenario import conditions as condition_readers
+from xosc_lateral.files.openscenario import storyboard as readers
 from xosc_lateral.files.openscenario.context import Context
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.world.player import storyboard_builder
@@ -70,9 +69,9 @@ def prepare_beyond(content: BeyondCondition, simulation: Simulation) -> EntityCh
 @pytest.fixture
 def _known(monkeypatch: pytest.MonkeyPatch) -> None:
     """A line in the reader's table, and one in the table of the module that plays it."""
-    monkeypatch.setitem(action_readers.PRIVATE_ACTIONS, "HurryAction", read_hurry)
+    monkeypatch.setitem(readers.PRIVATE_ACTIONS, "HurryAction", read_hurry)
     monkeypatch.setitem(storyboard_builder.RUNNING, HurryAction, RunningHurry)
-    monkeypatch.setitem(condition_readers.ENTITY_CONDITIONS, "BeyondCondition", read_beyond)
+    monkeypatch.setitem(readers.ENTITY_CONDITIONS, "BeyondCondition", read_beyond)
     monkeypatch.setitem(storyboard_builder.ENTITY_CHECKS, BeyondCondition, prepare_beyond)
 
 

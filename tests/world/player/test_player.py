@@ -29,7 +29,7 @@ from tests.kit.stage import (
     to_lane,
 )
 from xosc_lateral.base.errors import PlaybackError, XoscLateralError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.player import play

@@ -14,7 +14,7 @@ from lxml import etree
 from tests.kit import stage
 from tests.kit.places import VALID, wrapped
 from tests.kit.retold_roads import mirrored, moved, turned_round
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 

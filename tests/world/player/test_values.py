@@ -8,8 +8,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from xosc_lateral.world.player.simulation import Values, holds
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.player.values import Values, holds
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.global_actions import ModifyOperation
 from xosc_lateral.world.scenario.place import Place

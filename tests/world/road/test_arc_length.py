@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from xosc_lateral.files.opendrive.plan_view import PIECES, end_parameter, parameter_pieces
+from xosc_lateral.files.opendrive.plan_view import PIECES_PER_ELEMENT, end_parameter, parameter_pieces
 from xosc_lateral.world.road.lanes import LaneRecord, LaneSection, build_section
 from xosc_lateral.world.road.piecewise import Cubic, PiecewiseCubic, shift
 
@@ -25,8 +25,8 @@ def run(u: tuple[float, ...], v: tuple[float, ...], p: float) -> float:
 
 
 def p_at(pieces: np.ndarray, length: float, ds: float) -> float:
-    k = min(int(ds / (length / PIECES)), PIECES - 1)
-    h = ds - k * length / PIECES
+    k = min(int(ds / (length / PIECES_PER_ELEMENT)), PIECES_PER_ELEMENT - 1)
+    h = ds - k * length / PIECES_PER_ELEMENT
     a, b, c, d = pieces[k]
     return float(a + h * (b + h * (c + h * d)))
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.road.geometry import Arc, Line, Spiral, clothoid_pieces, tangent_series
 
 VALID = Path(__file__).parents[2] / "data" / "xodr" / "valid"

@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.samples import BRUTE_FORCE
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.places import VALID, hand_written
-from xosc_lateral.files.opendrive import read_opendrive
-from xosc_lateral.files.opendrive.reader import parse_opendrive
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.world.road.lanes import DRIVING
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from tests.kit.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
 from xosc_lateral.world.road.surface import Surface
 

@@ -20,7 +20,7 @@ from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentA
 from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.scenario import Action
 from xosc_lateral.world.surroundings.around import INFLUENCE_DISTANCE
-from xosc_lateral.world.surroundings.context import STEERING, entity_context
+from xosc_lateral.world.surroundings.context import STEERING_DURATION, entity_context
 
 GRID = np.arange(0, 501, 10)
 TRUCK = VehicleCategory.TRUCK
@@ -216,4 +216,4 @@ def test_a_step_of_the_road_is_seen_over_the_way_around_it(tmp_path: Path) -> No
     curve = context["curvature"] * (RADIUS + 1.5 * LANE_WIDTH)
     middle = float(np.interp(0.5, curve, 0.2 * np.arange(len(GRID))))
     assert middle == pytest.approx(4.0, abs=0.11)
-    assert np.diff(curve).max() < 0.2 / np.sqrt(2.0 * np.pi) / STEERING * 1.01
+    assert np.diff(curve).max() < 0.2 / np.sqrt(2.0 * np.pi) / STEERING_DURATION * 1.01

@@ -10,7 +10,13 @@ import pytest
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.workflows.conversion.enrich import enrich
-from xosc_lateral.world.surroundings.give_way import GAPS, OVERTAKING_SHARE, RESPONDING, SampledVehicle, give_way
+from xosc_lateral.world.surroundings.give_way import (
+    GAP_QUANTILES,
+    OVERTAKING_SHARE,
+    RESPONDING_GAPS,
+    SampledVehicle,
+    give_way,
+)
 
 ROWS = np.arange(0, 501, 10)
 
@@ -33,7 +39,7 @@ def test_a_narrow_gap_becomes_that_of_real_neighbours_and_the_overtaker_moves_mo
     inwards = 1.0 if rule == "RHT" else -1.0  # left of travel is towards the road's middle, or away from it
     push = moved(network, (outer, 0.6 * inwards), (inner, -0.53 * inwards))
     undisturbed = LANE_WIDTH - 1.13 - 2.0
-    wanted = float(np.interp(undisturbed, *GAPS)) - undisturbed
+    wanted = float(np.interp(undisturbed, *GAP_QUANTILES)) - undisturbed
     assert wanted > 0.5
     assert push[1] * inwards == pytest.approx(OVERTAKING_SHARE * wanted, rel=0.02)
     assert push[0] * inwards == pytest.approx(-(1 - OVERTAKING_SHARE) * wanted, rel=0.02)
@@ -60,7 +66,7 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
     stays, moves = give_way(together(right, left), network, sampled, ROWS)
     assert stays is None and moves is not None
     undisturbed = LANE_WIDTH - 1.0 - 2.0
-    assert moves[25] == pytest.approx(float(np.interp(undisturbed, *GAPS)) - undisturbed, rel=0.02)
+    assert moves[25] == pytest.approx(float(np.interp(undisturbed, *GAP_QUANTILES)) - undisturbed, rel=0.02)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -78,7 +84,9 @@ def test_where_a_profile_responds_to_somebody_by_itself_the_law_adds_what_that_l
         )
     ]
     right, left = give_way(together(*(one.motion for one in sampled)), network, sampled, ROWS)
-    by_law, after = (float(np.interp(gap, known, GAPS[1])) - gap for known in (GAPS[0], RESPONDING))
+    by_law, after = (
+        float(np.interp(gap, known, GAP_QUANTILES[1])) - gap for known in (GAP_QUANTILES[0], RESPONDING_GAPS)
+    )
     assert 0.0 < after < by_law
     assert left is not None
     if side == "left":  # who is overtaken has done its part

@@ -12,8 +12,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.cuts import MAX_GAP
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -32,11 +31,8 @@ OWN_ROWS = 0.3
 """Share of a column's values in rows without a place that speaks of a bus of its own: all, less those that coincide;
 where a camera loses the lane for that long, other columns are bridged over 0.5 s, and no more. [-]"""
 
-CONTRADICTION = 0.05
-"""Two rows of one time further apart than this contradict each other [m] ..."""
-
-MAX_CONTRADICTIONS = 0.01
-"""... and more than this share of them means several drives in one. [-]"""
+CONTRADICTION_DISTANCE, MAX_CONTRADICTIONS = 0.05, 0.01
+"""Rows of one time further apart contradict each other [m]; a larger share of them means several drives in one [-]."""
 
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
@@ -63,17 +59,10 @@ def clean_drive(
     """Rows of one drive, from whatever source, sorted by time, without repeated times and rows without a place in the
     lane; None when nothing is left.
 
-    Raises `FormatError` if a column can't be in the unit meant, or the rows are too far apart.
-
-    Parameters
-    ----------
-    columns : mapping of str to array, shape (n,)
-        `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
-        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
-    levels : frozenset of str
-        Columns that hold levels.
-    path : Path
-        What messages call the source.
+    `columns`, shape (n,): `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m];
+    `speed` [m/s] if known; `RUN` where an import has cut the drive; all others are context, of which `levels` hold
+    levels. NaN: missing, or "there is none". Raises `FormatError` if a column can't be in the unit meant, or the rows
+    are too far apart; `path` is what messages call the source.
     """
     columns = _in_order(columns, name, path)
     if RUN not in columns:
@@ -178,7 +167,7 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
             refuse(f"{limit.refusal(duration)}; {clock}")
     repeated = np.concatenate([[False], np.diff(time) <= 0])
     offset, later = _position(columns)[0], np.flatnonzero(repeated)
-    apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION).sum())
+    apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION_DISTANCE).sum())
     if apart > max(5, MAX_CONTRADICTIONS * len(time)):
         refuse(
             f"{apart} of {len(time)} rows repeat a time with another offset; if the table holds several drives it "
@@ -234,10 +223,10 @@ def _check_units(
 FROZEN_TIME = 1.0
 """Shorter repetitions do no harm: they are bridged or averaged. [s]"""
 
-CHANCE = 1e-6
+FROZEN_CHANCE = 1e-6
 """A stretch is frozen where a drive whose values otherwise repeat as often would have one so long this rarely. [-]"""
 
-CHANGES = 20
+MINIMUM_CHANGES = 20
 """Fewer changes of value in a whole drive don't tell how often a value repeats: it was made, not measured. [-]"""
 
 
@@ -245,13 +234,13 @@ def frozen_rows(time: FloatArray, offset: FloatArray, lane_width: FloatArray) ->
     """Rows, but the first, of stretches in which offset and lane width repeat to the last digit; shape (n,)."""
     frozen = np.zeros(len(time), dtype=np.bool_)
     same = (np.diff(offset) == 0.0) & (np.diff(lane_width) == 0.0)
-    if (~same).sum() < CHANGES or (np.diff(offset) != 0.0).sum() < CHANGES:
+    if (~same).sum() < MINIMUM_CHANGES or (np.diff(offset) != 0.0).sum() < MINIMUM_CHANGES:
         return frozen
     repeated = int(same.sum())
     for part in true_slices(same):
         count = part.stop - part.start
         usual = (repeated - count) / max(len(same) - count, 1)
-        if time[part.stop] - time[part.start] >= FROZEN_TIME and len(same) * usual**count < CHANCE:
+        if time[part.stop] - time[part.start] >= FROZEN_TIME and len(same) * usual**count < FROZEN_CHANCE:
             frozen[part.start + 1 : part.stop + 1] = True
     return frozen
 

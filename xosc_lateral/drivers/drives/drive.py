@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.resampling import STEP, average, nearest, resample
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,3 +132,149 @@ def _freeze(series: Drive | Run, name: str) -> None:
                 raise ValueError(f"drive {name}: {label} is not finite")
     context = {key: frozen(key, values) for key, values in series.context.items()}
     object.__setattr__(series, "context", MappingProxyType(context))
+
+
+# ---- what is cut out of a drive ----
+LANE_JUMP_SHARE = 0.5
+"""A change of the relative offset between two rows that means another lane. [-]"""
+
+HALF_WIDTH = 0.9
+"""Half of a car's width: a centre nearer than this to a marking has a wheel on it. [m]"""
+
+MAX_GAP = 0.5
+"""Missing rows up to this long are bridged; longer ones end a run. [s]"""
+
+ON_GRID = 1e-6
+"""Steps by which a row may miss an instant of the grid and still be at it: times are sums of steps. [-]"""
+
+MIN_RUN = 10.0
+"""Shorter runs are left out: they hold no whole snippet. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class CutRules:
+    """What is cut out of a drive; the defaults are the paper's where it gives one."""
+
+    min_speed: float = 40.0 / 3.6  # Slower driving is cut out (arXiv:2405.17080, section III). [m/s]
+    # Cut on each side of the moment in which the marking is crossed: a lane change takes 4-6 s, half of it before. [s]
+    lane_change_margin: float = 4.0
+    max_gap: float = MAX_GAP  # Longest gap that is bridged. [s]
+    min_run: float = MIN_RUN  # Shortest run that is kept. [s]
+    step: float = STEP  # Of the runs. [s]
+
+
+PAPER_RULES = CutRules()
+
+
+def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
+    """Road-following runs of one drive at an even step; empty when nothing is left."""
+    keep = ~(lane_change_rows(drive, rules) | slow_rows(drive, rules))
+    parts = [(rows, grid_of(drive, rows, rules.step)) for rows in _uninterrupted(drive, keep, rules.max_gap)]
+    lasting = [(rows, grid) for rows, grid in parts if (len(grid) - 0.5) * rules.step >= rules.min_run]
+    return [_run(drive, index, rows, grid) for index, (rows, grid) in enumerate(lasting)]
+
+
+def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run]:
+    """Runs of several drives.
+
+    Raises `NotEnoughDataError` when no run is left in any drive; says what was cut and why.
+    """
+    runs = [run for drive in drives for run in cut_runs(drive, rules)]
+    if not runs:
+        raise NotEnoughDataError(_why_nothing(drives, rules))
+    return runs
+
+
+def whole_run(drive: Drive) -> Run:
+    """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context."""
+    rows = slice(0, len(drive))
+    return _run(drive, 0, rows, grid_of(drive, rows, STEP))
+
+
+def grid_of(drive: Drive, rows: slice, step: float) -> FloatArray:
+    """Instants of the drive's grid, from its first row on every `step` [s], within some of its rows. [s]
+
+    All that is cut from a drive lies on one grid, so that it can be laid beside anything else of that drive.
+    """
+    first, last = (drive.time[[rows.start, rows.stop - 1]] - drive.time[0]) / step
+    return np.asarray(drive.time[0] + step * np.arange(np.ceil(first - ON_GRID), np.floor(last + ON_GRID) + 1.0))
+
+
+def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
+    """Rows within the margin of a lane change, shape (n,).
+
+    A lane has changed where `lane_index` does, where the offset jumps by half a lane width and more, and where rows are
+    missing while a wheel is on a marking: a camera that loses the lane there has another when it is back. None where an
+    import has cut them already.
+    """
+    if drive.run is not None:
+        return np.zeros(len(drive), dtype=np.bool_)
+    at = np.flatnonzero(_changes(drive, rules))
+    change = np.zeros(len(drive), dtype=np.bool_)
+    first = np.searchsorted(drive.time, drive.time[at] - rules.lane_change_margin)
+    last = np.searchsorted(drive.time, drive.time[at + 1] + rules.lane_change_margin, side="right")
+    for begin, end in zip(first, last, strict=True):
+        change[begin:end] = True
+    return change
+
+
+def lane_steps(offset: FloatArray, lane_width: FloatArray) -> BoolArray:
+    """Steps from row to row by which the offset jumps into another lane, shape (n - 1,); both [m] of shape (n,)."""
+    return np.asarray(np.abs(np.diff(offset)) > LANE_JUMP_SHARE * np.minimum(lane_width[1:], lane_width[:-1]))
+
+
+def _changes(drive: Drive, rules: CutRules) -> BoolArray:
+    """Steps from row to row between which the lane is another, shape (n - 1,)."""
+    step = lane_steps(drive.offset, drive.lane_width)
+    on_marking = np.abs(drive.offset) > 0.5 * drive.lane_width - HALF_WIDTH
+    step |= (np.diff(drive.time) > rules.max_gap) & (on_marking[1:] | on_marking[:-1])
+    lane = drive.context.get("lane_index")
+    if lane is not None:
+        known = np.flatnonzero(np.isfinite(lane))
+        moved = known[:-1][np.diff(lane[known]) != 0]
+        step[moved] = True
+    return step
+
+
+def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
+    """Rows below the least speed; none when no speed was recorded. Shape (n,). [-]"""
+    if drive.speed is None:
+        return np.zeros(len(drive), dtype=np.bool_)
+    return np.asarray(drive.speed < rules.min_speed)
+
+
+def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:
+    time = drive.time[rows]
+    context = {
+        name: (nearest if name in drive.levels else average)(time, values[rows], grid)
+        for name, values in drive.context.items()
+    }
+    lane_width, offset = average(time, drive.lane_width[rows], grid), resample(time, drive.offset[rows], grid)
+    return Run(
+        drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty,
+        drive.valid_below, drive.resolution,
+    )  # fmt: skip
+
+
+def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:
+    """Runs of kept rows without a gap."""
+    if not keep.any():
+        return []
+    rows = np.flatnonzero(keep)
+    new = (np.diff(rows) > 1) | (np.diff(drive.time[rows]) > max_gap)
+    if drive.run is not None:
+        new |= np.diff(drive.run[rows]) != 0
+    parts = np.split(rows, np.flatnonzero(new) + 1)
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
+
+
+def _why_nothing(drives: Sequence[Drive], rules: CutRules) -> str:
+    driven = sum(float(drive.time[-1] - drive.time[0]) for drive in drives if len(drive))
+    rows = max(1, sum(map(len, drives)))
+    slow = sum(float(slow_rows(drive, rules).sum()) for drive in drives) / rows
+    changes = sum(float(lane_change_rows(drive, rules).sum()) for drive in drives) / rows
+    return (
+        f"no run of {rules.min_run:g} s is left in {driven:.1f} s of driving: {100 * slow:.0f} % of the rows are "
+        f"below {3.6 * rules.min_speed:.0f} km/h, {100 * changes:.0f} % within "
+        f"{rules.lane_change_margin:g} s of a lane change"
+    )

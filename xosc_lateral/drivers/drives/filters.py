@@ -18,14 +18,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 
-LEAST_ATTENUATION = 21.0
-"""Of a rectangular window, shape 0: Kaiser's formulas begin there, and change at `GREAT_ATTENUATION`. [dB]"""
+LEAST_ATTENUATION, GREAT_ATTENUATION = 21.0, 50.0
+"""Of a rectangular window, shape 0, where Kaiser's formulas begin, and where they change. [dB]"""
 
-GREAT_ATTENUATION = 50.0
-"""[dB]"""
-
-LENGTH_OFFSET = 7.95
-LENGTH_SLOPE = 2.285
+LENGTH_OFFSET, LENGTH_SLOPE = 7.95, 2.285
 """Attenuation = offset + slope * transition width [rad per sample] * (taps - 1). [dB]"""
 
 SHAPE_POWER_FACTOR, SHAPE_POWER, SHAPE_SLOPE = 0.5842, 0.4, 0.07886

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.drives.cuts import CutRules, cut_runs, grid_of
-from xosc_lateral.drivers.drives.drive import Drive, Run
+from xosc_lateral.drivers.drives.drive import CutRules, Drive, Run, cut_runs, grid_of
 from xosc_lateral.drivers.drives.resampling import STEP, average, in_digits, nearest
 
 MAXIMUM_LEVELS = 8

@@ -25,8 +25,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.numbers import MAD_TO_SD
-from xosc_lateral.drivers.drives.cuts import MAX_GAP, lane_steps
-from xosc_lateral.drivers.drives.drive import MarkingShares
+from xosc_lateral.drivers.drives.drive import MAX_GAP, MarkingShares, lane_steps
 from xosc_lateral.drivers.drives.resampling import STEP
 
 DEGREES = 4.0
@@ -48,7 +47,7 @@ LEAST_NOISE = 0.05
 WAVERS_WITHIN = 51
 """Blocks, 10 s, about whose median a camera's noise is seen. [-]"""
 
-IMPOSSIBLE = 6.0
+MAXIMUM_ERROR_RATIO = 6.0
 """No noise is so many standard deviations off: a drive without it is left as it is. [-]"""
 
 LEAST_TRUST = 0.15
@@ -93,7 +92,10 @@ def both_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) 
     left[seen] = median(0.5 * lane_width - offset, block, np.flatnonzero(seen))
     right[seen] = median(0.5 * lane_width + offset, block, np.flatnonzero(seen))
     width = (left + right)[seen]
-    if not _jump_together(0.5 * (right - left)[seen], width):
+    # Where one marking is misjudged, the offset jumps by half as much as the lane width; one from elsewhere never does.
+    jumps = np.abs(np.diff(width)) > MAXIMUM_ERROR_RATIO * LEAST_NOISE
+    follows = np.abs(np.diff(0.5 * (right - left)[seen])) > 0.5 * MAXIMUM_ERROR_RATIO * LEAST_NOISE
+    if jumps.any() and not follows[jumps].any():
         return None
     about = np.abs(width - median_filter(width, size=WAVERS_WITHIN, mode="nearest"))
     noise = MAD_TO_SD * float(np.median(about)) / np.sqrt(2.0)
@@ -149,7 +151,7 @@ class BothMarkings:
             ):
                 break
         worst = max(float(np.abs(one).max()) for one in scaled)
-        return (offset, width) if worst > IMPOSSIBLE else None
+        return (offset, width) if worst > MAXIMUM_ERROR_RATIO else None
 
     def _prior(self) -> FloatArray:
         """Lower bands of the prior's precision; unknowns are offset and width of each block in turn, shape (5, 2 n)."""
@@ -199,13 +201,3 @@ def _blocks(time: FloatArray, breaks: BoolArray) -> tuple[IntArray, FloatArray]:
     steps = np.where(breaks, STEP, np.diff(time))
     moment = np.concatenate([[0.0], np.cumsum(steps)])
     return (moment / STEP).astype(np.int64), moment
-
-
-def _jump_together(offset: FloatArray, width: FloatArray) -> bool:
-    """Whether the offset of blocks ever jumps as the lane width does, as it must where one marking is misjudged. [m]
-
-    By half as much, that is; an offset from elsewhere, a satellite say, never does.
-    """
-    jumps = np.abs(np.diff(width)) > IMPOSSIBLE * LEAST_NOISE
-    follows = np.abs(np.diff(offset)) > 0.5 * IMPOSSIBLE * LEAST_NOISE
-    return not jumps.any() or bool(follows[jumps].any())

@@ -33,7 +33,7 @@ STAMP_ERROR = 1e-3
 ATTENUATION = 50.0
 """Of what would fold back: a movement of 1 m leaves 3 mm. [dB]"""
 
-PASS_BAND_EDGES, STOPPED = 1.5, 2.5
+PASS_BAND_EDGES, STOP_BAND_EDGE = 1.5, 2.5
 """Of the low-pass, for rows at `STEP`. [Hz]"""
 
 
@@ -45,7 +45,7 @@ def resample(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArr
     if _is_sparse(time, grid):
         return np.interp(grid, time, values)
     points = _points(time, grid)
-    kernel = low_pass_between(PASS_BAND_EDGES, STOPPED, STEP / points, ATTENUATION)
+    kernel = low_pass_between(PASS_BAND_EDGES, STOP_BAND_EDGE, STEP / points, ATTENUATION)
     fine = np.interp(_fine_grid(grid, points), time, values)
     return _decimate(mirrored(fine, len(kernel) // 2), kernel, len(grid), points)
 

@@ -25,7 +25,7 @@ BANDS = 16  # Of the log spectrum, from one period a snippet to the highest freq
 # Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement.
 EVEN_BANDS = 25
 # Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]
-VALUES = 20
+SHOWN_VALUES = 20
 # Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]
 MAXIMUM_SNIPPETS = 1500
 RESAMPLES = 200  # Of the drives, for the interval.
@@ -43,7 +43,7 @@ class TwoSampleResult:
 def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
     """Everything that gives a model away, shape (n, k); `fast`: also what second and third differences show."""
     difference = np.diff(snippets, axis=1)
-    every = max(1, snippets.shape[1] // VALUES)
+    every = max(1, snippets.shape[1] // SHOWN_VALUES)
     thin = snippets[:, ::every]
     energy = (difference**2).mean(axis=1) + 1e-15
     autocorrelation = [

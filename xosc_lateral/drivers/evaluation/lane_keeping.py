@@ -10,7 +10,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
+from xosc_lateral.drivers.drives.drive import HALF_WIDTH
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -105,7 +105,7 @@ HIGHWAY_SPEED, HIGHWAY_DRIVE = 95.0 / 3.6, 3600.0
 HIGHWAY_DRIVES = 60  # Sampled drives: the standard error of an SDLP is below 0.5 % then.
 WITHIN_DRIVER = 300.0  # Windows of which the deviation within one driver is taken besides. [s]
 NEAR_LINE = 0.2  # A side of the vehicle so near to a marking is near the line. [m]
-DRIFT, DRIFT_LASTS = 1.0, 8.0  # A lane drift is so far from the drive's mean [m] for so long [s] [5]_.
+DRIFT_DISTANCE, DRIFT_LASTS = 1.0, 8.0  # A lane drift is so far from the drive's mean [m] for so long [s] [5]_.
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,8 +234,8 @@ def lane_keeping(
 
 
 def _drifts(deviation: FloatArray, step: float) -> int:
-    """How often one is `DRIFT` or more from the mean, on one side, for `DRIFT_LASTS` or longer."""
-    sides = (deviation > DRIFT, deviation < -DRIFT)
+    """How often one is `DRIFT_DISTANCE` or more from the mean, on one side, for `DRIFT_LASTS` or longer."""
+    sides = (deviation > DRIFT_DISTANCE, deviation < -DRIFT_DISTANCE)
     return sum((part.stop - part.start) * step >= DRIFT_LASTS for far in sides for part in true_slices(far))
 
 

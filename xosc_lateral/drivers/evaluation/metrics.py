@@ -72,13 +72,18 @@ def cut_snippets(series: FloatArray, length: int) -> FloatArray:
     return np.asarray(series[: count * length].reshape(count, length))
 
 
-SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
+FREE_SPEED = 30.0  # Of the free runs: about 108 km/h. [m/s]
 # Free runs of a profile and their length [s]: 5 h, so that drivers who differ are all met.
-DRIVERS, DURATION = 60, 300.0
+DRIVER_COUNT, RUN_SECONDS = 60, 300.0
 
 
 def free_runs(
-    profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION, speed: float = SPEED
+    profile: DriverProfile,
+    seed: int,
+    *,
+    drivers: int = DRIVER_COUNT,
+    duration: float = RUN_SECONDS,
+    speed: float = FREE_SPEED,
 ) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
     segment = Segment.even(duration, profile.model.step, profile.lane_width, speed)
@@ -117,12 +122,17 @@ def wasserstein(a: FloatArray, b: FloatArray) -> float:
     return float(np.abs(below_a - below_b) @ steps)
 
 
+def wasserstein_columns(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Of each column, shape (k,), of rows of shape (n, k) and (m, k)."""
+    return np.array([wasserstein(a[:, k], b[:, k]) for k in range(a.shape[1])])
+
+
 def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
     """Wasserstein distance of each column, in standard deviations of the real one. [sd] Shapes (n, k) and (m, k)."""
     spread = real.std(axis=0)
     # a column that never varies has no scale of its own; any difference then counts in its own unit
     spread = np.where(spread > 0.0, spread, 1.0)
-    return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
+    return (wasserstein_columns(real, other) / spread).tolist()  # type: ignore[no-any-return]
 
 
 def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
@@ -163,11 +173,8 @@ ORDER = 0.5  # Of the variogram score: the power that its authors found most sen
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Energy score of each window, shape (n,): a proper score, lowest on average for the truth. [m]
 
-    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m), k >= 2: sampled for each. [m]
-
-    References
-    ----------
-    .. [1] T. Gneiting, A. E. Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007, 4.3.
+    `real`, shape (n, m): what was driven; `ensemble`, shape (n, k, m), k >= 2: sampled for each. [m] T. Gneiting, A. E.
+    Raftery, "Strictly Proper Scoring Rules, Prediction, and Estimation", JASA 102, 2007, section 4.3.
     """
     import scoringrules
 
@@ -178,10 +185,8 @@ def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
 def variogram_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:
     """Variogram score of each window, as `energy_score`: sees how values depend on one another. [m]
 
-    References
-    ----------
-    .. [1] M. Scheuerer, T. M. Hamill, "Variogram-Based Proper Scoring Rules for Probabilistic Forecasts of Multivariate
-       Quantities", Monthly Weather Review 143, 2015: order 0.5.
+    M. Scheuerer, T. M. Hamill, "Variogram-Based Proper Scoring Rules for Probabilistic Forecasts of Multivariate
+    Quantities", Monthly Weather Review 143, 2015: order 0.5.
     """
     import scoringrules
 

@@ -9,18 +9,18 @@ from itertools import combinations
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation import sizes
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
 from xosc_lateral.drivers.evaluation.metrics import (
-    DRIVERS,
-    DURATION,
+    DRIVER_COUNT,
     METRICS,
+    RUN_SECONDS,
     cut_snippets,
     free_runs,
     snippet_metrics,
-    wasserstein,
+    wasserstein_columns,
 )
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import LEVEL, Difference, Sizes, differences, sizes_of_samples, surest
 from xosc_lateral.drivers.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
 
@@ -36,30 +36,21 @@ class ComparedProfile:
     runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
-    measured: Sizes | None  # Of the drives that it was fitted on, where it knows them.
-    sampled: Sizes  # Of its own drives, as sure as if it had been fitted on such.
+    measured: sizes.Sizes | None  # Of the drives that it was fitted on, where it knows them.
+    sampled: sizes.Sizes  # Of its own drives, as sure as if it had been fitted on such.
     spectrum: Spectrum
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Compared:
-    """Profiles and how they differ.
-
-    Parameters
-    ----------
-    profiles : tuple of ComparedProfile
-    metrics : array, shape (k, k, 10)
-        Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
-        profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
-        most, where the mean over the metrics is the 95 % quantile of random choices.
-    scale : array, shape (10,)
-        Those standard deviations. [m]
-    seed : int
-    """
+    """Profiles and how they differ."""
 
     profiles: tuple[ComparedProfile, ...]
+    # Wasserstein distance per metric, shape (k, k, 10), in standard deviations over all profiles' snippets. On the
+    # diagonal: of a profile from itself, as much driving as it was fitted on from as much other driving, half of its
+    # drivers at most, where the mean over the metrics is the 95 % quantile of random choices.
     metrics: FloatArray
-    scale: FloatArray
+    scale: FloatArray  # Those standard deviations, shape (10,). [m]
     seed: int
 
     @property
@@ -79,28 +70,25 @@ class Compared:
         return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
-    def differences(self) -> dict[tuple[str, str], list[Difference]]:
+    def differences(self) -> dict[tuple[str, str], list[sizes.Difference]]:
         """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
-        return {
-            (first.profile.name, second.profile.name): _between(first, second)
-            for first, second in combinations(self.profiles, 2)
-        }
+        pairs = {}
+        for first, second in combinations(self.profiles, 2):
+            both = first.sampled, second.sampled
+            if first.measured is not None and second.measured is not None:
+                both = first.measured, second.measured
+            pairs[first.profile.name, second.profile.name] = sizes.differences(*both)
+        return pairs
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """Profiles that are alike, each with each (complete linkage): they differ no more than two fits of a driver."""
         from scipy.cluster.hierarchy import fcluster, linkage
 
-        apart = np.array([surest(parts) for parts in self.differences.values()])
-        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - LEVEL, "distance")
+        apart = np.array([sizes.surest(parts) for parts in self.differences.values()])
+        labels = fcluster(linkage(1.0 - apart, "complete"), 1.0 - sizes.SIGNIFICANCE_LEVEL, "distance")
         names = self.names
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == label)) for label in dict.fromkeys(labels))
-
-
-def _between(first: ComparedProfile, second: ComparedProfile) -> list[Difference]:
-    if first.measured is not None and second.measured is not None:
-        return differences(first.measured, second.measured)
-    return differences(first.sampled, second.sampled)
 
 
 def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
@@ -109,8 +97,8 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     for number, profile in enumerate(profiles):
         runs, drives, step = free_runs(profile, seed + number), highway_drives(profile, seed), profile.model.step
         known = profile.provenance.fit
-        measured = None if "derived_from" in known else Sizes.from_dict(known.get("sizes", {}))
-        sampled = sizes_of_samples(drives, step, *_fitted_drives(profile))
+        measured = None if "derived_from" in known else sizes.Sizes.from_dict(known.get("sizes", {}))
+        sampled = sizes.sizes_of_samples(drives, step, *_fitted_drives(profile))
         figures = figures_of(profile, seed, drives)
         compared.append(ComparedProfile(profile, runs, *figures, measured, sampled, spectrum(list(runs), step)))
     return Compared(tuple(compared), *_distances(compared, seed), seed)
@@ -127,10 +115,10 @@ def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArr
     scale = np.where(scale > 0.0, scale, 1.0)
     distances = np.empty((len(profiles), len(profiles), len(METRICS)))
     for row in range(len(profiles)):
-        fitted = round(_fitted_drives(profiles[row].profile)[1] / DURATION)
+        fitted = round(_fitted_drives(profiles[row].profile)[1] / RUN_SECONDS)
         distances[row, row] = _from_itself(drivers[row], fitted, scale, np.random.default_rng([seed, row]))
         for column in range(row):
-            distances[row, column] = distances[column, row] = _per_metric(pooled[row], pooled[column]) / scale
+            distances[row, column] = distances[column, row] = wasserstein_columns(pooled[row], pooled[column]) / scale
     return distances, scale
 
 
@@ -138,7 +126,7 @@ def _fitted_drives(profile: DriverProfile) -> tuple[int, float]:
     """How many drives a profile was fitted on, and how long they are [s]; half of the free runs' if unknown."""
     known = profile.provenance
     if not known.hours or "derived_from" in known.fit:
-        return DRIVERS // 2, DURATION * (DRIVERS // 2)
+        return DRIVER_COUNT // 2, RUN_SECONDS * (DRIVER_COUNT // 2)
     return max(known.drives, 1), 3600.0 * known.hours
 
 
@@ -149,10 +137,8 @@ def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, 
     for _ in range(HALVINGS):
         order = rng.permutation(len(drivers)).tolist()
         half, rest = order[:count], order[-count:]
-        distances.append(_per_metric(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+        distances.append(
+            wasserstein_columns(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale
+        )
     means = [float(gaps.mean()) for gaps in distances]
     return distances[int(np.argsort(means)[round(HALVING_COUNT_AND_SHARE * (HALVINGS - 1))])]
-
-
-def _per_metric(first: FloatArray, other: FloatArray) -> FloatArray:
-    return np.array([wasserstein(first[:, k], other[:, k]) for k in range(first.shape[1])])

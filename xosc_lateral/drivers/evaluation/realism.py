@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation import measures, snippets, spectra
+from xosc_lateral.drivers.evaluation import snippets, spectra
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.drivers.evaluation.metrics import SCORE_UNITS, proper_scores, split_groups
 from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, Snippets
@@ -54,7 +54,7 @@ def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> Varianc
 SPLITS = 8  # Random halves of the drives that both are averaged over.
 MINIMUM_GROUPS = 20  # Fewer snippets of a length: it is left out.
 # Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each.
-ENSEMBLE, SCORED = 8, 200
+ENSEMBLE_SIZE, SCORED_SNIPPETS = 8, 200
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class ConditionScores:
     condition: SnippetCondition
     with_sensor: bool  # Whether what was sampled holds the profile's sensor.
     count: int  # Snippets.
-    # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `measures.differences`. With the same start and
+    # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `snippets.differences`. With the same start and
     # 10 s, also the proper scores [m].
     families: Mapping[str, Beside]
     named: Mapping[str, Beside]  # Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
@@ -157,8 +157,8 @@ def _under(
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
     highest = spectra.PASS_FREQUENCY / spectra.STOP_FREQUENCY * condition.below if condition.slow else np.inf
-    measured = measures.features_of(real, cut.lane_width, step, highest=highest)
-    made = measures.features_of(sampled, cut.lane_width, step, highest=highest)
+    measured = snippets.features_of(real, cut.lane_width, step, highest=highest)
+    made = snippets.features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, measured, made, real, cut.group, seed)
     alone = jointly = floor = None
     shown = (real, sampled)
@@ -174,14 +174,14 @@ def _under(
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
-    with_sensor, means = profile.sensor is not None and not condition.slow, measures.named_means(measured, made)
+    with_sensor, means = profile.sensor is not None and not condition.slow, snippets.named_means(measured, made)
     return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(
     condition: SnippetCondition,
-    measured: measures.Features,
-    made: measures.Features,
+    measured: snippets.Features,
+    made: snippets.Features,
     real: FloatArray,
     group: NDArray[np.str_],
     seed: int,
@@ -194,15 +194,15 @@ def _distances(
         rows, others = np.flatnonzero(half), np.flatnonzero(~half)
         stand_ins = None
         if condition.same_start:  # other drivers' snippets that start there too
-            count, first = min(measures.FLOOR_DRAWS, len(others)), real[:, 0]
+            count, first = min(snippets.FLOOR_DRAWS, len(others)), real[:, 0]
             starts = first[rows], group[rows], first[others], group[others]
-            stand_ins = others[measures.windows_with_the_same_start(*starts, rng, count=count)]
-        values.append(measures.differences(measured, made, rows, rows))
-        floors.append(measures.real_against_real(measured, measured, rows, others, stand_ins))
-        named.append(measures.named_distances(measured.take(rows), made.take(rows)))
+            stand_ins = others[snippets.windows_with_the_same_start(*starts, rng, count=count)]
+        values.append(snippets.differences(measured, made, rows, rows))
+        floors.append(snippets.real_against_real(measured, measured, rows, others, stand_ins))
+        named.append(snippets.named_distances(measured.take(rows), made.take(rows)))
         beside = others if stand_ins is None else stand_ins[:, 0]
-        named_floors.append(measures.named_distances(measured.take(rows), measured.take(beside)))
-    return _beside(values, floors, measures.UNITS), _beside(named, named_floors, {})
+        named_floors.append(snippets.named_distances(measured.take(rows), measured.take(beside)))
+    return _beside(values, floors, snippets.UNITS), _beside(named, named_floors, {})
 
 
 def _beside(
@@ -216,12 +216,13 @@ def _beside(
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
     """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
-    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
-    some = cut.take(chosen)
-    members = [snippets.sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
-    rng, starts = np.random.default_rng(seed), (some.offset[:, 0], some.group, cut.offset[:, 0], cut.group)
-    drivers = measures.windows_with_the_same_start(*starts, rng, count=ENSEMBLE)
-    sampled = proper_scores(some.offset, np.stack(members, axis=1))
-    real = proper_scores(some.offset, cut.offset[drivers])
+    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED_SNIPPETS)).astype(np.int64))
+    driven, every = cut.offset[chosen], cut.segments
+    segments = [every[row] for row in chosen]
+    members = [snippets.sample_recorded(profile, segments, driven[:, 0], seed + 10 + k) for k in range(ENSEMBLE_SIZE)]
+    rng, starts = np.random.default_rng(seed), (driven[:, 0], cut.group[chosen], cut.offset[:, 0], cut.group)
+    drivers = snippets.windows_with_the_same_start(*starts, rng, count=ENSEMBLE_SIZE)
+    sampled = proper_scores(driven, np.stack(members, axis=1))
+    real = proper_scores(driven, cut.offset[drivers])
     added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
     return replace(scores, families={**scores.families, **added})

@@ -92,7 +92,7 @@ def score_snippets(
 
 LONG_SNIPPET = 60.0  # [s]
 LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)  # Of the autocorrelation. [s]
-TRACES, TRACE = 6, 120.0  # Drives of which a trace is kept for the eye, and its length. [s]
+TRACE_COUNT, TRACE_SECONDS = 6, 120.0  # Drives of which a trace is kept for the eye, and its length. [s]
 MIN_SNIPPETS = 20  # Fewer say nothing about a distribution.
 
 
@@ -126,7 +126,7 @@ class ProfileScores:
     autocorrelation_sampled: FloatArray  # shape (k,). [-]
     margins_real: Margins
     margins_sampled: Margins
-    traces: tuple[Trace, ...]  # The longest run of each of the first `TRACES` drives, for the eye.
+    traces: tuple[Trace, ...]  # The longest run of each of the first `TRACE_COUNT` drives, for the eye.
     seed: int
     # Movement below this alone was compared in `snippets` and `realism`: 0.5 Hz or, of free runs, less. [Hz]
     below: float = spectra.STOP_FREQUENCY
@@ -219,10 +219,10 @@ def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> 
     for k, run in enumerate(runs):
         if run.drive not in longest or len(run) > len(runs[longest[run.drive]]):
             longest[run.drive] = k
-    rows = slice(0, round(TRACE / step) + 1)
+    rows = slice(0, round(TRACE_SECONDS / step) + 1)
     return tuple(
         Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
-        for drive, k in list(longest.items())[:TRACES]
+        for drive, k in list(longest.items())[:TRACE_COUNT]
     )
 
 

@@ -29,7 +29,7 @@ BLOCK_S = 300.0  # Stretches that count as independent: three times as long as d
 LEAST_MEAN_SQUARE = 1e-12  # Of a mean square: of a car that does not move. [m2]
 # Share of pairs of one driver that are told apart, by whichever quantity, and the chance of finding the least
 # difference that is named. [-]
-LEVEL, POWER = 0.05, 0.8
+SIGNIFICANCE_LEVEL, TEST_POWER = 0.05, 0.8
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,7 +149,7 @@ def differences(first: Sizes, second: Sizes) -> list[Difference]:
     size, error = second.values - first.values, np.hypot(first.errors, second.errors)
     known = np.flatnonzero(np.isfinite(error) & (error > 0.0))
     number = max(len(known), 1)
-    least = float(norm.isf(0.5 * LEVEL / number) + norm.ppf(POWER))
+    least = float(norm.isf(0.5 * SIGNIFICANCE_LEVEL / number) + norm.ppf(TEST_POWER))
     p_values = np.minimum(2.0 * number * norm.sf(np.abs(size[known]) / error[known]), 1.0)
     return [
         Difference(QUANTITIES[k], float(size[k]), float(error[k]), least * float(error[k]), float(p_value))

@@ -42,9 +42,8 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import autocovariance, fit_volatility, log_power, rounded
 from xosc_lateral.drivers.fitting.sensor.likelihood import KNOTS, interpolation
 from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
-from xosc_lateral.drivers.model.core.autoregressive.coarse import BORDER, COARSE_EVERY, FREQUENCIES
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
+from xosc_lateral.drivers.model.core.autoregressive.parameters import BORDER, COARSE_EVERY, FREQUENCIES, Volatility
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ModelKind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Piecewise
 from xosc_lateral.drivers.model.profile import DriverProfile

@@ -25,7 +25,7 @@ from xosc_lateral.base.numbers import all_significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.regression import autoregressive_least_squares, random_effects_least_squares
-from xosc_lateral.drivers.model.core.autoregressive.coarse import split_bands
+from xosc_lateral.drivers.model.core.autoregressive.parameters import split_bands
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.drivers.model.profile import SIDES, SIGNIFICANT_ERRORS, Basis, Beside
 
@@ -144,8 +144,8 @@ def _snippets(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> tuple[Floa
     number = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
     levels, rows, drive = [], [], []
     for run in runs:
-        slow, fast = split_bands(run.offset, STEP)
         quantities = np.stack([_quantity(shape, run) for shape in shapes], axis=1)
+        slow, fast = split_bands(run.offset, STEP)
         for first in range(0, len(run) - size + 1, size):
             part = slice(first, first + size)
             deviations = np.log(slow[part].std() + 1e-6), np.log(fast[part].std() + 1e-6)
@@ -158,8 +158,8 @@ def _snippets(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> tuple[Floa
 
 def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
     """The one number that an effect goes by, shape (n,): of a speed, its place between the knots."""
-    if isinstance(effect, Proximity):  # a run that has no such column had nobody there
-        return effect.response(STEP, run.context)[:, 0] if effect.column in run.context else np.zeros(len(run))
+    if isinstance(effect, Proximity):
+        return _nearness(run, effect)
     values = effect.quantity(run.context)
     return values[:, 1] - values[:, 2] if isinstance(effect, Piecewise) else values[:, 0]
 

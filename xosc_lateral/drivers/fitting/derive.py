@@ -33,7 +33,7 @@ TOLERANCE = 0.02
 DESIGN_SEED, PROOF_SEED = 20261, 20262
 """Seeds of the runs that handles are corrected by, and of those that the result is measured with. [-]"""
 
-DRIVES = 240
+DRIVE_COUNT = 240
 """Of an hour each, twice as many for a memory or a share near a line: standard errors are 0.3 % of an SDLP, 0.6 % of a
 memory, 2 % of a share of 0.02."""
 
@@ -71,7 +71,7 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
     plain, adapted = _of_class(_single(base), asked.vehicle)
     plain = structs.replace(plain, name=name)
     half_width = TRUCK_HALF_WIDTH if asked.vehicle == "truck" else None
-    count = DRIVES if asked.memory is None and asked.near_line is None else 2 * DRIVES
+    count = DRIVE_COUNT if asked.memory is None and asked.near_line is None else 2 * DRIVE_COUNT
 
     def measured(handles: Adapted, seed: int) -> tuple[LaneKeeping, FloatArray]:
         drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=count)

@@ -251,15 +251,7 @@ class Whitener:
             result[run.start : stop] = start[:known, :known] @ scaled[run.start : stop]
         if not self.runs:
             result[~self.valid] = 0.0
-        return np.asarray(result[:, 0] if values.ndim == 1 else result)
-
-    def without_levels(self, white: FloatArray) -> FloatArray:
-        """Take the drives' levels out of whitened rows [-], shape (n,) or (n, k)."""
-        columns = white[:, None] if white.ndim == 1 else white
-        ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
-        mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
-        result = columns - ones * mean[self.drive]
-        return np.asarray(result[:, 0] if white.ndim == 1 else result)
+        return np.asarray(result.reshape(values.shape))
 
     def levels(self, values: FloatArray) -> FloatArray:
         """Level of every drive by generalised least squares, shape (drives,). [m]"""
@@ -267,8 +259,11 @@ class Whitener:
         return np.asarray(sums / np.maximum(self.power, 1e-300))
 
     def rows(self, values: FloatArray) -> FloatArray:
-        """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
-        return self.without_levels(self.white(values))
+        """Whitened, the drives' levels out; shape of `values` [m], (n,) or (n, k), the rows of variance 1. [-]"""
+        columns = self.white(values[:, None] if values.ndim == 1 else values)
+        ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
+        mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
+        return np.asarray((columns - ones * mean[self.drive]).reshape(values.shape))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,24 +21,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.columns import Column, Role, Values
-from xosc_lateral.drivers.model.effects import (
-    EFFECTS,
-    Acts,
-    Angular,
-    ColumnEffect,
-    Factor,
-    Form,
-    Levels,
-    Linear,
-    Magnitude,
-    Nearness,
-    Piecewise,
-    Product,
-    Proximity,
-    Saturating,
-    Threshold,
-    known_effects,
-)
+from xosc_lateral.drivers.model import effects
+from xosc_lateral.drivers.model.effects import EFFECTS, Acts, ColumnEffect, Factor, Form, Product, known_effects
 
 LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)  # Quantiles at which limits are tried first; refined later. [-]
 FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())  # The quantiles at which they are refined. [-]
@@ -104,13 +88,13 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray]) 
 
     def contrasts(effect: ColumnEffect) -> list[tuple[float, ...]]:
         """Weights of its components with which an effect is tried."""
-        if isinstance(effect, Angular):
+        if isinstance(effect, effects.Angular):
             return [(float(np.sin(phase)), float(np.cos(phase))) for phase in PHASES]
         return [(1.0,) * effect.quantity({name: context[name][:1] for name in effect.columns}).shape[1]]
 
     candidates = []
-    for family, effects in families.items():
-        members = [(effect, contrast) for effect in effects for contrast in contrasts(effect)]
+    for family, shapes in families.items():
+        members = [(effect, contrast) for effect in shapes for contrast in contrasts(effect)]
         candidates += [Candidate(effect, family, 2.0 * float(np.log(len(members))), one) for effect, one in members]
     return candidates
 
@@ -131,7 +115,7 @@ def _unique(shapes: Iterable[ColumnEffect]) -> list[ColumnEffect]:
 def _fading(column: Column, values: FloatArray, shares: Sequence[float] = FINE_SCALES) -> Iterator[ColumnEffect]:
     if column.gaps and column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
         for share in shares:
-            yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale)
+            yield effects.Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale)
 
 
 def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
@@ -140,18 +124,18 @@ def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
         return []
     knots = np.unique(_quantiles(values[np.isfinite(values)], KNOTS)).tolist()
     several = (some for number in (1, 2) for some in combinations(knots, number))
-    return [Piecewise(acts=Acts.LOCATION, column=column.name, knots=some) for some in several]
+    return [effects.Piecewise(acts=Acts.LOCATION, column=column.name, knots=some) for some in several]
 
 
 def _plain(column: Column, values: FloatArray) -> Iterator[ColumnEffect]:
     name = column.name
     if column.values is Values.ANGLE:
-        yield Angular(acts=Acts.LOCATION, column=name, period=column.period)
+        yield effects.Angular(acts=Acts.LOCATION, column=name, period=column.period)
         return
     if _varies(values):
-        yield Linear(acts=Acts.LOCATION, column=name)
+        yield effects.Linear(acts=Acts.LOCATION, column=name)
     if column.gaps:
-        yield Nearness(acts=Acts.LOCATION, column=name, presence=True)
+        yield effects.Nearness(acts=Acts.LOCATION, column=name, presence=True)
         yield from _fading(column, values, (1.0,))
 
 
@@ -159,23 +143,23 @@ def _bent(column: Column, values: FloatArray, limits: Sequence[float] = LIMITS) 
     name, seen = column.name, values[np.isfinite(values)]
     yield from offered_effects(name, values)
     if column.values is Values.LEVELS:
-        yield from (Levels(acts=Acts.LOCATION, column=name, levels=(level,)) for level in column.levels)
+        yield from (effects.Levels(acts=Acts.LOCATION, column=name, levels=(level,)) for level in column.levels)
     if column.values is not Values.NUMBER or not _varies(values):
         return
     for at in np.unique(_quantiles(seen, limits)).tolist():
         if seen.min() < at < seen.max():
-            yield Threshold(acts=Acts.LOCATION, column=name, at=at)
-            yield Threshold(acts=Acts.LOCATION, column=name, at=at, jump=False)
+            yield effects.Threshold(acts=Acts.LOCATION, column=name, at=at)
+            yield effects.Threshold(acts=Acts.LOCATION, column=name, at=at, jump=False)
     low, middle, high = _quantiles(seen, (0.1, 0.5, 0.9)).tolist()
     if high > low:
         for width in (0.2, 0.5):
-            yield Saturating(acts=Acts.LOCATION, column=name, middle=middle, scale=width * (high - low))
+            yield effects.Saturating(acts=Acts.LOCATION, column=name, middle=middle, scale=width * (high - low))
     if seen.min() < 0.0 < seen.max():
-        yield Magnitude(acts=Acts.LOCATION, column=name)
+        yield effects.Magnitude(acts=Acts.LOCATION, column=name)
     for share in SCALES if column.gaps else ():
         if (scale := _scale(values, share)) > 0.0:
-            yield Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale)
-            yield Proximity(acts=Acts.LOCATION, column=name, scale=scale)
+            yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale)
+            yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=scale)
 
 
 def _factors(column: Column, values: FloatArray) -> list[Factor]:

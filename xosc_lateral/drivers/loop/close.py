@@ -10,16 +10,9 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.loop import held_out
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
-from xosc_lateral.drivers.loop.held_out import (
-    HeldOut,
-    Scorecard,
-    Setting,
-    fit_refined,
-    fit_without,
-    score_held_out,
-    score_runs,
-)
+from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting
 from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
@@ -142,7 +135,7 @@ def close_loop(
     kind = ModelKind.TWO_LEVEL if paper else ModelKind.AUTOREGRESSIVE
     if base is None:
         progress(0.02, "fitting the base profile")
-        base = fit_without(fit_model(coarse, ()), everything, kind, f"{name}-base", provenance)
+        base = held_out.fit_without(fit_model(coarse, ()), everything, kind, f"{name}-base", provenance)
     # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
     initial = initial_terms(base, timeline) if is_given else ()
     identified = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
@@ -160,7 +153,7 @@ def close_loop(
     refined = base
     if selection.accepted or not is_given or lacks:
         began_with = base if is_given else None
-        refined = fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
+        refined = held_out.fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
     rng = generator(root, LoopSeed.SNIPPETS)
@@ -177,7 +170,7 @@ def close_loop(
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         explained=_explained(setting, identified),
         remainder=check_remainder(selection.final, identified.quantities, root),
-        scores=score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
+        scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
 
@@ -185,7 +178,9 @@ def close_loop(
 def _that_helps(setting: Setting, identified: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
     """Less what makes held-out blocks look less like the profile, the worst first; and how the rest is scored."""
     while True:
-        scored = score_held_out(setting, identified.selection, identified.nested, identified.usable.columns, progress)
+        scored = held_out.score_held_out(
+            setting, identified.selection, identified.nested, identified.usable.columns, progress
+        )
         before, after = scored.errors
         if not identified.selection.accepted:
             return identified, scored

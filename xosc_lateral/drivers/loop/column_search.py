@@ -13,23 +13,25 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.dictionary import (
     CROSS_BASIS,
+    LIKELIHOOD_MARGIN,
     Dictionary,
     Search,
+    beside,
     beside_parts,
     build_dictionary,
+    of_unit_variance,
     orthonormal,
     score_entries,
 )
 from xosc_lateral.drivers.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
-from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, upper_tail
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, draw_null, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
 
 CONTENDERS = 4  # Sets of columns that are refined, at most.
-LIKELIHOOD_MARGIN = 12.0  # Sets of columns that score lower than the best by more than this are not. [squared score]
 # A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 # factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]
 ROUNDING = 1e-6
@@ -183,11 +185,9 @@ class ColumnSearch:
             if rows.any():
                 blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
         known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
-        drive, rng = search.coarse.drive[problem.whitener.valid], generator(search.seed, LoopSeed.COLUMNS)
-        of_mean = kind.acts is Acts.LOCATION
-        scores, maxima = score_entries(
-            dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean
-        )
+        left, drive = of_unit_variance(beside(known, problem.observed)), search.coarse.drive[problem.whitener.valid]
+        null = draw_null(left, drive, generator(search.seed, LoopSeed.COLUMNS), draws)
+        scores, maxima = score_entries(dictionary, left, known, barred, null, of_mean=kind.acts is Acts.LOCATION)
 
         @cache
         def span(column: str) -> FloatArray:
@@ -196,7 +196,7 @@ class ColumnSearch:
             both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
             return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
 
-        scores = beside_parts(scores, dictionary, problem.observed, known, span, LIKELIHOOD_MARGIN)
+        scores = beside_parts(scores, dictionary, left, known, span)
         return _Scored(problem, dictionary, known, scores, maxima)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
@@ -207,7 +207,8 @@ class ColumnSearch:
         slow, and against slow noise a quicker look-alike stands out better than the effect itself.
         """
         term: SearchedTerm = self.kind.of(scored.dictionary.timed(scored.best))
-        after = self._fit_with(term)
+        coarse, terms = self.fitted.coarse, self.fitted.terms
+        after = fit_model(coarse, (*terms, term))
         best: Refined | None = None
         for _ in range(ROUNDS):
             problem = self.kind.reweighted(self.fitted, after)
@@ -215,7 +216,7 @@ class ColumnSearch:
             if here is None:
                 break
             refined, other = self._refined(here)
-            other_after = self._fit_with(other)
+            other_after = fit_model(coarse, (*terms, other))
             if best and 2.0 * other_after.log_likelihood - refined.price <= 2.0 * after.log_likelihood - best.price:
                 break
             same = other.columns == term.columns
@@ -223,9 +224,6 @@ class ColumnSearch:
             if same or problem is None:
                 break
         return term, after
-
-    def _fit_with(self, term: SearchedTerm) -> Fitted:
-        return fit_model(self.fitted.coarse, (*self.fitted.terms, term))
 
     def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
         """Refine the best sets of columns; the best of them, which knows what others explain as much."""

@@ -79,7 +79,7 @@ class Assigned:
 
 
 # Words of a name that say what a column is; the first that fits counts: a lane departure is no lane.
-_WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
+_ROLE_WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
     (role, frozenset(words.split()))
     for role, words in (
         (Role.OWN, "steering steer handwheel yaw yawrate roll sideslip departure ldw lka lks keeping crossing heading"),
@@ -96,16 +96,16 @@ _WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
     )
 )  # fmt: skip
 # A name with one of these says nothing: a temperature of the car itself is no weather, a time of day may act.
-_SILENT = frozenset(["cabin", "tyre", "tire", "engine", "oil", "day"])
+_NEUTRAL_WORDS = frozenset(["cabin", "tyre", "tire", "engine", "oil", "day"])
 
 
 def proposed_role(column: str) -> Role:
     """What a column's name says it is."""
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)
     words = set(re.split(r"[^a-z]+", spaced.lower()))
-    if words & _SILENT:
+    if words & _NEUTRAL_WORDS:
         return Role.UNKNOWN
-    return next((role for role, known in _WORDS if words & known), Role.UNKNOWN)
+    return next((role for role, known in _ROLE_WORDS if words & known), Role.UNKNOWN)
 
 
 def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
@@ -206,9 +206,9 @@ def read_column(name: str, seen: FloatArray, period: float) -> Column | str:
 ComplexArray = NDArray[np.complex128]
 
 # Samples per segment of the spectral estimate: 25.6 s, and 12.8 s where runs are too short for enough of those.
-SEGMENTS = (128, 64)
+SEGMENT_ROWS = (128, 64)
 # Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]
-BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
+FEEDBACK_BAND_HZ = (0.2, 0.3, 0.4, 0.6, 0.8)
 # Squared coherence from which a column is feedback if the movement predicts it too, and from which it is doubtful if
 # not. Causes that change over ten seconds and more stay below 0.06, also where they move the car by 0.9 m; a switch
 # that moves a car of little movement of its own by 0.2 m has 0.29, gusts of 3 s that push a car by 0.8 m up to 0.49;
@@ -217,20 +217,21 @@ FEEDBACK_COHERENCE, DOUBTFUL_COHERENCE = 0.2, 0.5
 # Share of a column's innovations that the movement predicts: from the first on it is feedback, from the second on
 # doubtful; below the last, coherence alone is doubtful too. Causes that share more than 0.2 (gusts that push a car by
 # 0.8 m) stay below 0.0006; a steering angle or a yaw rate that mostly follows the road's curves has 0.0065. [-]
-PREDICTED, DOUBTFUL_SHARE, NEGLIGIBLE_SHARE = 0.05, 0.02, 0.003
+FEEDBACK_SHARE, DOUBTFUL_SHARE, NEGLIGIBLE_SHARE = 0.05, 0.02, 0.003
 # Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
 # it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]
-FUNCTION = 0.4
+FUNCTION_COHERENCE = 0.4
 # Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]
-PARTS = np.concatenate([np.array([0.005, 0.01, 0.02]), np.linspace(0.04, 0.96, 24), np.array([0.98, 0.99, 0.995])])
-PARTS_S = 150.0  # Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
+MOVEMENT_QUANTILES = np.r_[0.005, 0.01, 0.02, np.linspace(0.04, 0.96, 24), 0.98, 0.99, 0.995]
+# Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
+HALVES_BLOCK_S = 150.0
 # Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s.
 OWN_PAST, MOVED_PAST = 10, 5
 # Over the number of segments: what unrelated columns' coherence stays below, the largest of 4 parts and 6 movements
 # (with 40 half-overlapping segments they reach 0.14). [-]
-CHANCE = 6.0
+CHANCE_COHERENCE = 6.0
 # Rows per quantity that a regression needs to tell anything (F. Harrell, Regression Modeling Strategies, 2015). [-]
-ROWS_EACH = 15
+ROWS_PER_QUANTITY = 15
 MIN_SEGMENTS = 12  # Fewer segments of one length than this say little: the next length is taken.
 
 
@@ -254,7 +255,7 @@ def find_feedback(
     segments, moved = _Segments(timeline.valid), _movement(timeline)
     spectra = {name: segments.spectra(values) for name, values in moved.items()}
     rows = np.flatnonzero(positions_in_run(timeline.valid) >= max(OWN_PAST, MOVED_PAST))
-    chance = CHANCE / max(1, segments.number)
+    chance = CHANCE_COHERENCE / max(1, segments.number)
     feedback = []
     for column in columns:
         assigned = roles.get(column.name, Assigned(column.name, Role.UNKNOWN, ""))
@@ -276,14 +277,14 @@ def find_feedback(
         predicted = _predicted_share(values, moved, rows) if changes else 0.0
         of, coherence = max(shared.items(), key=lambda pair: pair[1])
         of_function, function = max(by_function.items(), key=lambda pair: pair[1])
-        is_function = function >= max(FUNCTION, chance)
+        is_function = function >= max(FUNCTION_COHERENCE, chance)
         follows = coherence >= max(FEEDBACK_COHERENCE, chance) and predicted >= NEGLIGIBLE_SHARE
-        clear = follows or predicted >= PREDICTED
+        clear = follows or predicted >= FEEDBACK_SHARE
         doubtful = coherence >= max(DOUBTFUL_COHERENCE, chance) or predicted >= DOUBTFUL_SHARE
         if is_function and not clear:
             of = of_function
         if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
-            clear, doubtful = predicted >= PREDICTED and coherence >= max(DOUBTFUL_COHERENCE, chance), False
+            clear, doubtful = predicted >= FEEDBACK_SHARE and coherence >= max(DOUBTFUL_COHERENCE, chance), False
         is_movement = assigned.role is Role.OWN
         if is_movement or clear or is_function or doubtful:
             sure, source = is_movement or clear or is_function, assigned.source if is_movement else ""
@@ -293,8 +294,8 @@ def find_feedback(
 
 def _mean_given(values: FloatArray, movement: FloatArray, timeline: Timeline) -> FloatArray:
     """Mean of a column given the movement just then, by the other half of the drives; shape (n,), in its unit."""
-    part = np.searchsorted(np.unique(np.quantile(movement[timeline.valid], PARTS)), movement)
-    half = (np.arange(len(values)) // round(PARTS_S / timeline.step)) % 2
+    part = np.searchsorted(np.unique(np.quantile(movement[timeline.valid], MOVEMENT_QUANTILES)), movement)
+    half = (np.arange(len(values)) // round(HALVES_BLOCK_S / timeline.step)) % 2
     usual, size = float(values[timeline.valid].mean()), int(part.max()) + 1
     result = np.full(len(values), usual)
     for part_of_two in (0, 1):
@@ -322,7 +323,7 @@ def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
 
 def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: IndexArray) -> float:
     """Partial R squared of the recent movement, the present included, given the column's own past."""
-    if len(rows) < ROWS_EACH * (1 + OWN_PAST + len(moved) * len(range(0, MOVED_PAST + 1, 2))):
+    if len(rows) < ROWS_PER_QUANTITY * (1 + OWN_PAST + len(moved) * len(range(0, MOVED_PAST + 1, 2))):
         return 0.0
     now = values[rows]
     past = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]
@@ -345,7 +346,7 @@ class _Segments:
 
     def __init__(self, valid: BoolArray) -> None:
         sums = np.concatenate([[0], np.cumsum(valid)])
-        for length in SEGMENTS:
+        for length in SEGMENT_ROWS:
             starts, at = [], 0
             while at + length <= len(valid):
                 inside = sums[at + length] - sums[at] == length
@@ -356,8 +357,8 @@ class _Segments:
         self.number = len(starts)
         self._rows = np.asarray(starts, dtype=np.intp)[:, None] + np.arange(length)
         frequency = np.fft.rfftfreq(length, STEP)
-        self._in_band = (frequency >= BAND[0]) & (frequency <= BAND[-1])
-        self._part = np.searchsorted(BAND[1:-1], frequency[self._in_band], side="right")
+        self._in_band = (frequency >= FEEDBACK_BAND_HZ[0]) & (frequency <= FEEDBACK_BAND_HZ[-1])
+        self._part = np.searchsorted(FEEDBACK_BAND_HZ[1:-1], frequency[self._in_band], side="right")
 
     def spectra(self, values: FloatArray) -> ComplexArray:
         """Transforms of the first difference in the band, shape (segments, frequencies)."""

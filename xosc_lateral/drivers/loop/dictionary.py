@@ -22,7 +22,6 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.autocorrelation import Whitener
 from xosc_lateral.drivers.loop.candidates import Candidate, Family, candidates_of
 from xosc_lateral.drivers.loop.columns import Column
-from xosc_lateral.drivers.loop.significance import NULL_DRAWS, draw_null
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
 from xosc_lateral.drivers.model.effects import ColumnEffect
 
@@ -35,13 +34,15 @@ TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
 # A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
 MIN_SUPPORT_S = 45.0
+LIKELIHOOD_MARGIN = 12.0  # Sets of columns that score lower than the best by more than this are not looked at. [-]
 LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
 # Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
 CROSS_BASIS = 0.01
-ROBUST = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
-RESPONSES = 12  # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
-CHUNK = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
-TINY = 1e-30  # Keeps single precision from dividing by zero.
+ROBUST_ENTRIES = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
+# Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+RESPONSE_ENTRIES = 12
+CHUNK_CANDIDATES = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+LEAST_POWER = 1e-30  # Keeps single precision from dividing by zero.
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +107,8 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
     single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
     for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
-        for first in range(0, len(members), CHUNK):
-            chunk = members[first : first + CHUNK]
+        for first in range(0, len(members), CHUNK_CANDIDATES):
+            chunk = members[first : first + CHUNK_CANDIDATES]
             for response_s, lags in grid.items():
                 response = quantities.responses(chunk, response_s)
                 for lag in lags:
@@ -116,10 +117,10 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
                     rows = compact.rows(moved)
                     squares = np.square(rows)
                     power = squares.sum(axis=0)
-                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
-                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), TINY)  # within drives
+                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), LEAST_POWER)
+                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), LEAST_POWER)  # within drives
                     kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
-                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], TINY))
+                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], LEAST_POWER))
                     blocks.append(unit.T.astype(np.float32, copy=False))
                     entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
     timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
@@ -139,22 +140,16 @@ def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> Fl
 
 def score_entries(
     dictionary: Dictionary,
-    residual: FloatArray,
+    left: FloatArray,
     known: FloatArray,
     barred: BoolArray,
-    drive: IndexArray,
-    rng: np.random.Generator,
+    null: FloatArray,
     *,
-    draws: int = NULL_DRAWS,
-    of_mean: bool = True,
+    of_mean: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the null's residuals;
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the `null`'s residuals;
     beside `known`, orthonormal columns. Loudness where entries act is evidence of a spread, not of a mean."""
-    left = beside(known, residual)
-    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
-    if len(dictionary) == 0 or barred.all():
-        return np.full(len(dictionary), -np.inf), np.zeros(0)
-    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng, draws)], axis=1)
+    rotated = np.concatenate([left[:, None], null], axis=1)
     rotated = beside(known, rotated).astype(np.float32)
     basis = known.astype(np.float32)
     squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
@@ -179,17 +174,17 @@ def _beside_loud_stretches(
     scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
 ) -> FloatArray:
     """Scores of the best entries by the squares of their own rows [2]_: the null loses where they are large."""
-    order = np.argsort(-scores)[:ROBUST]
+    order = np.argsort(-scores)[:ROBUST_ENTRIES]
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
     rows -= (rows @ basis) @ basis.T
     columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
     rest = np.empty_like(rows)
     for read in set(columns):  # what some response to the same columns explains is not loudness
-        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSES]
+        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSE_ENTRIES]
         span = orthonormal(rows[alike].T)
         rest[[others == read for others in columns]] = beside(span, left)
-    power = np.maximum(np.square(rows).sum(axis=1), TINY)
+    power = np.maximum(np.square(rows).sum(axis=1), LEAST_POWER)
     weights = np.square(rows) / power[:, None]
     scatter = (weights * np.square(rest)).sum(axis=1)
     # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
@@ -203,16 +198,9 @@ def _beside_loud_stretches(
 
 
 def beside_parts(
-    scores: FloatArray,
-    dictionary: Dictionary,
-    residual: FloatArray,
-    known: FloatArray,
-    spans: Callable[[str], FloatArray],
-    within: float,
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, known: FloatArray, spans: Callable[[str], FloatArray]
 ) -> FloatArray:
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components."""
-    left = beside(known, residual)
-    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -221,14 +209,14 @@ def beside_parts(
     scores, open_pairs = scores.copy(), set(members)
     while open_pairs:
         pair = max(open_pairs, key=lambda columns: float(scores[members[columns]].max()))
-        if float(scores[members[pair]].max()) < float(scores.max()) - within:
+        if float(scores[members[pair]].max()) < float(scores.max()) - LIKELIHOOD_MARGIN:
             break
         open_pairs.remove(pair)
         entries = members[pair]
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
         rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
         power = np.square(rows).sum(axis=0)
-        gains = np.square(beside(span, left) @ rows) / np.maximum(power, TINY) - dictionary.costs[entries]
+        gains = np.square(beside(span, left) @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
         scores[entries] = np.where(power > LEFT_OVER, np.minimum(scores[entries], gains), -np.inf)
     return scores
 
@@ -241,6 +229,11 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
     powers, directions = np.linalg.eigh(columns.T @ columns)
     kept = powers > share * max(float(powers[-1]), 1e-300)
     return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+def of_unit_variance(rows: FloatArray) -> FloatArray:
+    """Rows about zero, shape (n,), over their root mean square. [-]"""
+    return np.asarray(rows / max(float(np.sqrt(np.mean(rows**2))), 1e-300))
 
 
 def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:

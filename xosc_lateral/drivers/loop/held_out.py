@@ -12,8 +12,7 @@ from msgspec import structs
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.cuts import MIN_RUN
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import MIN_RUN, Run
 from xosc_lateral.drivers.drives.filters import filtered
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import (
@@ -26,22 +25,13 @@ from xosc_lateral.drivers.evaluation.metrics import (
 from xosc_lateral.drivers.fitting.bands import in_bands, measured
 from xosc_lateral.drivers.fitting.context_effects import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.loop import residual
 from xosc_lateral.drivers.loop.columns import Column
 from xosc_lateral.drivers.loop.identify import Nested, Progress, folds_of, hold_out_blocks
 from xosc_lateral.drivers.loop.model import Fitted, fit_model
-from xosc_lateral.drivers.loop.residual import (
-    LEVEL,
-    SummaryStatistics,
-    error_between,
-    expected,
-    half_samples,
-    simulated_runs,
-    size_of,
-    statistics_of,
-)
 from xosc_lateral.drivers.loop.selection import Selection
 from xosc_lateral.drivers.loop.significance import LoopSeed
-from xosc_lateral.drivers.loop.terms.cycle import CycleTerm
+from xosc_lateral.drivers.loop.terms.hidden import CycleTerm
 from xosc_lateral.drivers.loop.timeline import Coarse, Timeline, coarse_middle
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Acts, Effect
@@ -104,7 +94,7 @@ class Setting:
 class HeldOut:
     """Summary statistics on held-out blocks, measured and expected of both profiles. [m]"""
 
-    statistics: SummaryStatistics
+    statistics: residual.SummaryStatistics
     real: dict[str, FloatArray]  # By group.
     before: dict[str, FloatArray]
     after: dict[str, FloatArray]
@@ -115,7 +105,7 @@ class HeldOut:
     @property
     def errors(self) -> tuple[float, float]:
         """Errors before and after. [m]"""
-        return error_between(self.real, self.before), error_between(self.real, self.after)
+        return residual.error_between(self.real, self.before), residual.error_between(self.real, self.after)
 
     @property
     def surely_worse(self) -> bool:
@@ -123,14 +113,14 @@ class HeldOut:
         rises = []
         for half in self.halves:
             other = {name: values + np.nan_to_num(half[name]) for name, values in self.real.items()}
-            rises.append(error_between(other, self.after) > error_between(other, self.before))
-        return float(np.mean(rises)) >= 1.0 - LEVEL
+            rises.append(residual.error_between(other, self.after) > residual.error_between(other, self.before))
+        return float(np.mean(rises)) >= 1.0 - residual.LEVEL
 
     def error_of(self, group: str) -> tuple[float, float]:
         """Errors before and after in one group; 0 where there is none. [m]"""
         if group not in self.real:
             return 0.0, 0.0
-        before, after = (size_of({"": self.real[group] - side[group]}) for side in (self.before, self.after))
+        before, after = (residual.size_of({"": self.real[group] - side[group]}) for side in (self.before, self.after))
         return before, after
 
 
@@ -140,13 +130,13 @@ def score_held_out(
     """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
     timeline, fitted = setting.coarse.timeline, selection.final
     frequency = next((term.frequency for term in fitted.terms if isinstance(term, CycleTerm)), None)
-    statistics = statistics_of(timeline, _quantities(fitted, columns), frequency)
+    statistics = residual.statistics_of(timeline, _quantities(fitted, columns), frequency)
     runs_before, runs_after = _held_out_runs(setting, selection, nested, progress)
     real = statistics.describe(timeline.offset, timeline.valid)
-    before = expected(statistics, runs_before, timeline.valid)
-    after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
+    before = residual.expected(statistics, runs_before, timeline.valid)
+    after = before if runs_after is runs_before else residual.expected(statistics, runs_after, timeline.valid)
     unmoved = timeline.offset - removal_of(fitted)[Acts.LOCATION]
-    halves = half_samples(statistics, unmoved, setting.blocks, generator(setting.root, LoopSeed.BLOCKS))
+    halves = residual.half_samples(statistics, unmoved, setting.blocks, generator(setting.root, LoopSeed.BLOCKS))
     return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 
 
@@ -168,7 +158,7 @@ def _held_out_runs(
             profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
-            runs = simulated_runs(profile, coarse.timeline, child(setting.root, LoopSeed.FOLDS), held=held)
+            runs = residual.simulated_runs(profile, coarse.timeline, child(setting.root, LoopSeed.FOLDS), held=held)
             sides[side] = sides[side] if len(sides[side]) else np.zeros_like(runs)
             sides[side][:, held] = runs[:, held]
     return sides[0], sides[1] if len(sides[1]) else sides[0]

@@ -23,7 +23,14 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.drivers.loop.candidates import Family
-from xosc_lateral.drivers.loop.dictionary import CROSS_BASIS, MIN_SUPPORT_S, Quantities, beside, orthonormal
+from xosc_lateral.drivers.loop.dictionary import (
+    CROSS_BASIS,
+    MIN_SUPPORT_S,
+    Quantities,
+    beside,
+    of_unit_variance,
+    orthonormal,
+)
 from xosc_lateral.drivers.loop.model import Fitted
 from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
 from xosc_lateral.drivers.loop.timeline import Coarse
@@ -31,6 +38,13 @@ from xosc_lateral.drivers.model.seeds import generator
 
 # Delays between which a course over time is linear: from what a driver sees ahead to where a bend has long ended. [s]
 DELAYS = (-5.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0, 12.0, 15.0)
+SECONDS = tuple(range(int(DELAYS[0]), int(DELAYS[-1]) + 1))  # From the first delay to the last. [s]
+_TENTS = np.stack([np.interp(SECONDS, DELAYS, unit) for unit in np.eye(len(DELAYS))])
+# Weights of these in kernels of gain 1 that rise to each delay from the one before and fall to the next.
+KERNELS = _TENTS / _TENTS.sum(axis=1, keepdims=True)
+_CURVATURE = np.diff(np.eye(len(DELAYS) + 2), 2, axis=0)[:, 1:-1]
+# Of weights whose second differences are independent, and which end at zero on either side.
+SMOOTH_COVARIANCE = np.asarray(np.linalg.inv(_CURVATURE.T @ _CURVATURE), dtype=np.float64)
 LEVEL = 0.05  # p-value of the check up to which more is left than chance. [-]
 
 
@@ -48,25 +62,12 @@ class Omnibus:
         return self.p_value > LEVEL
 
 
-def weights_of(delays: tuple[float, ...]) -> FloatArray:
-    """Of whole seconds in tents of gain 1 that reach from each delay to its neighbours, shape (delays, n)."""
-    seconds = np.arange(delays[0], delays[-1] + 1.0)
-    weights = np.stack([np.interp(seconds, delays, unit) for unit in np.eye(len(delays))])
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
-def tents(values: FloatArray, delays: tuple[float, ...], drive: IndexArray) -> FloatArray:
-    """Values by the second, shape (n,), through the kernels of `weights_of`, outermost rows held; shape (n, delays)."""
+def tents(values: FloatArray, drive: IndexArray) -> FloatArray:
+    """Values by the second, shape (n,), through the kernels, outermost rows held; shape (n, delays)."""
     first, last = np.searchsorted(drive, drive, side="left"), np.searchsorted(drive, drive, side="right") - 1
-    rows, reach = np.arange(len(values)), np.arange(int(delays[0]), int(delays[-1]) + 1)
-    shifted = np.stack([values[np.clip(rows - late, first, last)] for late in reach], axis=1)
-    return np.asarray(shifted @ weights_of(delays).T)
-
-
-def smooth_covariance(number: int) -> FloatArray:
-    """Of weights whose second differences are independent, and which end at zero on either side."""
-    second = np.diff(np.eye(number + 2), 2, axis=0)[:, 1:-1]
-    return np.asarray(np.linalg.inv(second.T @ second), dtype=np.float64)
+    rows = np.arange(len(values))
+    shifted = np.stack([values[np.clip(rows - late, first, last)] for late in SECONDS], axis=1)
+    return np.asarray(shifted @ KERNELS.T)
 
 
 def amid_runs(valid: BoolArray) -> BoolArray:
@@ -84,7 +85,7 @@ def courses(
     compact, valid = whitener.compact, whitener.valid
     for candidate, values in zip(quantities.candidates, quantities.values, strict=True):
         if candidate.family is Family.PLAIN and (not only or candidate.columns == only):
-            moved = tents(values.astype(np.float64), DELAYS, quantities.drive)[valid]
+            moved = tents(values.astype(np.float64), quantities.drive)[valid]
             rows, power = compact.rows(moved)[amid[valid]], float(np.square(moved).sum())
             if float(np.square(rows).sum()) > 1e-9 * power:  # it varies within drives
                 responses.setdefault(candidate.columns, []).append(rows)
@@ -127,7 +128,7 @@ def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
     """Squares that an orthonormal basis explains, or less, beside the squares of the rows it rests on [2]_."""
     scores = basis.T @ rows
     left = rows - basis @ scores
-    weighed = basis * (left / max(float(np.sqrt(np.mean(left**2))), 1e-300))[:, None]
+    weighed = basis * of_unit_variance(left)[:, None]
     return min(float(scores @ scores), float(scores @ np.linalg.pinv(weighed.T @ weighed) @ scores))
 
 
@@ -161,9 +162,9 @@ def explained_share(
 ) -> Explained | None:
     """What each fold's effects and free response predict of rows not fitted on; None: nothing is held out."""
     # all columns' plain shapes at all delays, such that smooth weights are white
-    root = np.linalg.cholesky(smooth_covariance(len(DELAYS)))
+    root = np.linalg.cholesky(SMOOTH_COVARIANCE)
     plain = [
-        tents(values.astype(np.float64), DELAYS, quantities.drive) @ root
+        tents(values.astype(np.float64), quantities.drive) @ root
         for candidate, values in zip(quantities.candidates, quantities.values, strict=True)
         if candidate.family is Family.PLAIN
     ]

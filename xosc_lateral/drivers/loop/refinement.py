@@ -17,7 +17,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.drivers.loop.columns import Column
-from xosc_lateral.drivers.loop.dictionary import beside, orthonormal
+from xosc_lateral.drivers.loop.dictionary import beside, of_unit_variance, orthonormal
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import ColumnEffect, Product
 from xosc_lateral.drivers.model.effects.shapes import Form
@@ -59,8 +59,7 @@ class Refinement:
     def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:
         self._coarse, self._problem, self._costs = coarse, problem, costs
         self._basis = known.astype(np.float32)
-        left = beside(known, problem.observed)
-        self._left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+        self._left = of_unit_variance(beside(known, problem.observed))
         self._quantities: dict[ColumnEffect, FloatArray] = {}
         self._responses: dict[tuple[ColumnEffect, float], FloatArray] = {}
 

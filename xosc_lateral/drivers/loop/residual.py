@@ -93,8 +93,11 @@ def statistics_of(
     """Bins for every quantity, shape (n,) each, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
-        none = np.isnan(values)
-        smooth = in_digits(timeline.respond(_filled(values, timeline.valid), 0.0, RESPONSE_S))
+        none, seen = np.isnan(values), values[timeline.valid & np.isfinite(values)]
+        # the mean where there is none, the farthest where nobody is within reach
+        usual, farthest = (seen.mean(), seen.max()) if len(seen) else (0.0, 0.0)
+        filled = np.nan_to_num(values, nan=usual, posinf=farthest, neginf=usual)
+        smooth = in_digits(timeline.respond(filled, 0.0, RESPONSE_S))
         label, middle = _binned(smooth, timeline.valid, none)
         label[missing_throughout(values, timeline)] = -1
         if len(middle) > 1:
@@ -116,16 +119,15 @@ def simulated_runs(
         runs = FEW_RUNS if len(timeline.names) >= MANY_DRIVES else N_RUNS
     result = np.zeros((runs, len(timeline)))
     context = {"lane_width": timeline.lane_width, **timeline.context}
+    speed = context.get("speed", np.full(len(timeline), np.nan))
     for index, span in enumerate(timeline.spans):
-        rows = slice(span.start, span.stop)
-        if held is not None and not held[rows].any():
+        if held is not None and not held[span].any():
             continue
-        n = span.stop - span.start
         segment = Segment(
-            time=timeline.time[span.start] + timeline.step * np.arange(n),
-            lane_width=timeline.lane_width[rows],
-            speed=context["speed"][rows] if "speed" in context else np.full(n, np.nan),
-            context={name: values[rows] for name, values in context.items()},
+            time=timeline.time[span.start] + timeline.step * np.arange(span.stop - span.start),
+            lane_width=timeline.lane_width[span],
+            speed=speed[span],
+            context={name: values[span] for name, values in context.items()},
             before=PAD,
             after=PAD,
         )
@@ -292,10 +294,3 @@ def _time_bins(timeline: Timeline) -> tuple[IntArray, FloatArray]:
             share = (rows - inside[0]) / max(1, inside[-1] - inside[0] + 1)
             label[rows] = np.clip((share * TIME_PARTS).astype(np.intp), 0, TIME_PARTS - 1)
     return label, (np.arange(TIME_PARTS) + 0.5) / TIME_PARTS
-
-
-def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:
-    """The mean where there is none, the farthest where nobody is within reach."""
-    seen = values[valid & np.isfinite(values)]
-    usual, farthest = (seen.mean(), seen.max()) if len(seen) else (0.0, 0.0)
-    return np.nan_to_num(values, nan=usual, posinf=farthest, neginf=usual)

@@ -17,12 +17,12 @@ from xosc_lateral.base.limits import LIVE_RANGES
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import ResponseState
-from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
 from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
 
-BLOCK = 64
+ROWS_DRAWN = 64
 """Model steps drawn at once for a driver. [-]"""
 
 _NO_FACTORS = (0.0, 1.0, 1.0, 1.0)
@@ -30,7 +30,7 @@ _NO_FACTORS = (0.0, 1.0, 1.0, 1.0)
 
 _DRIVER = np.dtype(
     [("mean", float), ("at", np.int64), ("left", np.int64), ("row", np.int64), ("samples", float, 4),
-     ("drawn", float, (2 * BLOCK, 2 + len(_NO_FACTORS)))]
+     ("drawn", float, (2 * ROWS_DRAWN, 2 + len(_NO_FACTORS)))]
 )  # fmt: skip
 """Of one driver: what his coarse part moves about [-], which drawn row is next and how many are left, his next model
 step, his last samples [m], rows drawn ahead: coarse and fine movement [lane widths], parts of his hidden effects."""
@@ -104,8 +104,7 @@ class ResponseStream:
 class DriverState(msgspec.Struct, kw_only=True):
     """Where a driver of a group is; see `_DRIVER`."""
 
-    process: Any
-    """`DriveState`."""
+    process: Any  # `DriveState`.
     mean: float = 0.0
     drawn: list[list[float]] = msgspec.field(default_factory=list)
     row: int
@@ -148,11 +147,6 @@ class OffsetGroup:
     def __len__(self) -> int:
         return len(self._drives)
 
-    @property
-    def preview(self) -> float:
-        """By how much later drivers respond than those who know what lies ahead. [s]"""
-        return (rows_ahead(self.profile) + SAMPLES_AHEAD) * self.profile.model.step
-
     def add(self, seeds: Sequence[np.random.SeedSequence], time: float = 0.0) -> None:
         """More drivers, whose drives begin with the next sample, at a time of their own clocks. [s]"""
         for drive in self._join(seeds):
@@ -181,7 +175,7 @@ class OffsetGroup:
         Parameters
         ----------
         context : mapping of str to array, shape (n,)
-            Of this moment, all `columns`; a driver responds to it `preview` seconds later.
+            Of this moment, all `columns`; a driver responds `rows_ahead` and `SAMPLES_AHEAD` later.
         width : array, shape (n,)
             Of the lane. [m]
 
@@ -241,23 +235,23 @@ class OffsetGroup:
     def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
         remaining = self._state["left"]
-        if remaining.min(initial=2 * BLOCK) > BLOCK:
+        if remaining.min(initial=2 * ROWS_DRAWN) > ROWS_DRAWN:
             return
         due = set(drivers[remaining[drivers] == 0].tolist())
-        spare = drivers[remaining[drivers] <= BLOCK]
-        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
+        spare = drivers[remaining[drivers] <= ROWS_DRAWN]
+        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // ROWS_DRAWN]]
         for k in sorted(due | set(few.tolist())):
             driver, left = self._state[k], remaining[k]
             driver["drawn"][:left] = driver["drawn"][driver["at"] : driver["at"] + left]
-            driver["mean"], driver["drawn"][left : left + BLOCK] = self._block(k)
-            driver["at"], driver["left"] = 0, left + BLOCK
+            driver["mean"], driver["drawn"][left : left + ROWS_DRAWN] = self._block(k)
+            driver["at"], driver["left"] = 0, left + ROWS_DRAWN
 
     def _block(self, k: int) -> tuple[float, FloatArray]:
-        """Mean, and the `BLOCK` rows of a drive that come after all that is drawn, shape (BLOCK, parts)."""
+        """Mean, and the `ROWS_DRAWN` rows of a drive that come after all that is drawn, shape (BLOCK, parts)."""
         drive, row = self._drives[k], int(self._state["row"][k] + self._state["left"][k])
-        hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
-        movement = drive.movement(BLOCK, hidden.rate)
-        rows = np.empty((BLOCK, 2 + len(_NO_FACTORS)))
+        hidden = drive.hidden_terms_at(np.arange(row, row + ROWS_DRAWN))
+        movement = drive.movement(ROWS_DRAWN, hidden.rate)
+        rows = np.empty((ROWS_DRAWN, 2 + len(_NO_FACTORS)))
         rows[:, 0], rows[:, 1] = movement.coarse, movement.fine
         for column, (values, neutral) in enumerate(zip(hidden.parts, _NO_FACTORS, strict=True)):
             self._hidden[column] |= values is not None
@@ -275,29 +269,22 @@ class OffsetGroup:
     # ---- state -------------------------------------------------------------------------------------------------------
     def driver_states(self) -> list[DriverState]:
         """Where everybody is."""
-        return [
-            DriverState(
-                process=drive.state,
-                mean=float(own["mean"]),
-                drawn=own["drawn"][own["at"] : own["at"] + own["left"]].tolist(),
-                row=int(own["row"]),
-                samples=tuple(own["samples"].tolist()),
-            )
-            for drive, own in zip(self._drives, self._state, strict=True)
-        ]
+        states = []
+        for drive, driver in zip(self._drives, self._state, strict=True):
+            rows = driver["drawn"][driver["at"] : driver["at"] + driver["left"]].tolist()
+            mean, row, samples = float(driver["mean"]), int(driver["row"]), tuple(driver["samples"].tolist())
+            states.append(DriverState(process=drive.state, mean=mean, drawn=rows, row=row, samples=samples))
+        return states
 
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
         responses = [response.state.response for response in self.responses]
-        values: dict[str, Any] = plain(
-            {"responses": responses, "drives": self.driver_states(), "columns": self.columns}
-        )
-        return values
+        return plain({"responses": responses, "drives": self.driver_states(), "columns": self.columns})  # type: ignore[no-any-return]
 
     def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
-        drivers = read_as(list[DriverState], state["drives"], "drives")
         responses = read_as(list[ResponseState], state["responses"], "responses")
+        drivers = read_as(list[DriverState], state["drives"], "drives")
         self.go_on_from(drivers, [ResponseStreamState(response) for response in responses], seeds)
 
     def go_on_from(

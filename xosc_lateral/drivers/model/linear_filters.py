@@ -32,12 +32,10 @@ def prepare(steps: int) -> None:
 class JitKernel:
     """A function over arrays with a plain Python body; call it with the count of its steps first.
 
-    Importing numba costs 0.4 s, more than a scenario of a minute needs; a sample of hours needs it. Both ways
-    run the same operations in the same order: the numbers are the same to the last bit (no fast-math, no fused
-    multiply-add).
-
-    The body indexes its arguments with whole numbers only. It gets lists in plain Python (three times as fast as arrays
-    there) and arrays when compiled, and writes its results into its array arguments.
+    Importing numba costs 0.4 s, more than a scenario of a minute needs; a sample of hours needs it. Both ways give the
+    same numbers to the last bit (no fast-math, no fused multiply-add). The body indexes its arguments with whole
+    numbers only. It gets lists in plain Python (three times as fast as arrays there) and arrays when compiled, and
+    writes its results into its array arguments.
     """
 
     def __init__(self, body: Callable[..., Any]) -> None:

@@ -28,11 +28,8 @@ if TYPE_CHECKING:
 MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
 
-TRIAL = 150
-"""Model steps that a profile is tried with: half a minute. [-]"""
-
-TRIAL_SPEED = 30.0
-"""Speed of the trial. [m/s]"""
+TRIAL_STEPS, TRIAL_SPEED = 150, 30.0
+"""Model steps that a profile is tried with, half a minute [-], and the speed [m/s]."""
 
 
 def check_offsets(
@@ -48,13 +45,9 @@ def check_offsets(
         return
     first = int(far[0])
     when = "" if time is None else f" at {time[first]:g} s"
-    limit = OFFSET_LANES.refusal(_lanes(offset, lane_width, first))
+    width = np.broadcast_to(np.asarray(lane_width, dtype=np.float64), offset.shape)[first]
+    limit = OFFSET_LANES.refusal(float(abs(offset[first]) / max(width, MINIMUM_LANE_WIDTH)))
     raise DriverProfileError(f"{subject}: an offset of {offset[first]:.4g} m{when}; {limit}")
-
-
-def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> float:
-    width = np.broadcast_to(np.asarray(lane_width, dtype=np.float64), offset.shape)[row]
-    return float(abs(offset[row]) / max(width, MINIMUM_LANE_WIDTH))
 
 
 def check_context(context: Mapping[str, float], subject: str) -> None:
@@ -103,11 +96,11 @@ def check_profile(profile: DriverProfile) -> None:
     """
     from xosc_lateral.drivers.model.sampling import sample_offsets
 
-    time = profile.model.step * np.arange(TRIAL, dtype=np.float64)
-    width = np.full(TRIAL, profile.lane_width)
+    time = profile.model.step * np.arange(TRIAL_STEPS, dtype=np.float64)
+    width = np.full(TRIAL_STEPS, profile.lane_width)
     subject = f"profile {profile.name} in half a minute of even traffic"
     with np.errstate(all="ignore"):
-        offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL, TRIAL_SPEED)), 0)
+        offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL_STEPS, TRIAL_SPEED)), 0)
     check_offsets(offset, width, subject, time)
 
 

@@ -9,7 +9,6 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any
 
-import msgspec
 import numpy as np
 from msgspec import Meta, defstruct, field, structs
 
@@ -17,9 +16,9 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
-from xosc_lateral.drivers.model.core.registry import CORE_MODELS, any_model
+from xosc_lateral.drivers.model.core.registry import any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect
-from xosc_lateral.drivers.model.records import Record, read_as, schema_hook, set_once
+from xosc_lateral.drivers.model.records import Record, read_as, set_once
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.drivers.model.validity import Validity
 
@@ -236,18 +235,6 @@ def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
     fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]
     made: Any = defstruct("DriverProfile", fields, bases=(DriverProfile,), frozen=True, kw_only=True)
     return made  # type: ignore[no-any-return]
-
-
-def profile_schema() -> dict[str, Any]:
-    """JSON Schema of a profile file, generated from the types; plug-ins are not in it."""
-    schema = msgspec.json.schema(file_type(CORE_MODELS[0].model.kind, frozenset()), schema_hook=schema_hook)
-    definition = schema["$defs"]["DriverProfile"]
-    head = {"format": {"const": FORMAT}, "version": {"const": VERSION}}
-    definition["properties"] = head | definition["properties"]
-    definition["required"] = [*head, *definition["required"]]
-    definition["title"] = f"Driver profile of xosc-lateral, version {VERSION}"
-    definition["description"] = "Offsets are relative to the lane width, positive to the left of travel."
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
 def sampling_hash(profile: DriverProfile) -> str:

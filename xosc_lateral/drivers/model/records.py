@@ -73,13 +73,6 @@ def frozen_array(values: object, dtype: type[np.generic] = np.float64) -> NDArra
     return array
 
 
-def schema_hook(kind: type) -> dict[str, Any]:
-    """JSON Schema of what msgspec doesn't know: arrays."""
-    if kind is np.ndarray or get_origin(kind) is np.ndarray:
-        return {"type": "array", "items": {"type": ["number", "array"]}}
-    raise NotImplementedError(kind)
-
-
 def _encoded(value: object) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist() if value.size or value.ndim == 1 else {"shape": list(value.shape)}

@@ -40,32 +40,21 @@ class StreamState(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
     profile: str = ""
     seed: SeedState
-    factor: int
-    """Steps per model step."""
+    factor: int  # Steps per model step.
     start: float | None
     time: float
-    known: tuple[str, ...] | None = None
-    """Context columns that count; None before the first context."""
-    widths: list[float] = msgspec.field(default_factory=list)
-    """Lane widths of rows ahead. [m]"""
-    recalled: int = 0
-    """Rows before the drive."""
-    looked: int = 0
-    """Steps looked ahead."""
-    row: int = 0
-    """Next model step."""
-    phase: int = 0
-    """Step within it."""
-    samples: list[float] = msgspec.field(default_factory=list)
-    """Model samples about the present piece. [m]"""
-    curve: tuple[float, ...] = ()
-    """Its coefficients. [m]"""
+    known: tuple[str, ...] | None = None  # Context columns that count; None before the first context.
+    widths: list[float] = msgspec.field(default_factory=list)  # Lane widths of rows ahead. [m]
+    recalled: int = 0  # Rows before the drive.
+    looked: int = 0  # Steps looked ahead.
+    row: int = 0  # Next model step.
+    phase: int = 0  # Step within it.
+    samples: list[float] = msgspec.field(default_factory=list)  # Model samples about the present piece. [m]
+    curve: tuple[float, ...] = ()  # Its coefficients. [m]
+    # Of the effects whose columns are known.
     responses: list[ResponseStreamState] = msgspec.field(name="answers", default_factory=list)
-    """Of the effects whose columns are known."""
-    process: Any = None
-    """`DriveState`; None before the first context."""
-    mean: float = 0.0
-    """As `drawn`, see `group.DriverState`; states of 0.2 have neither, and their rows drawn ahead in `process`."""
+    process: Any = None  # `DriveState`; None before the first context.
+    mean: float = 0.0  # As `drawn`, see `group.DriverState`; 0.2 wrote neither, and kept rows drawn ahead in `process`.
     drawn: list[list[float]] = msgspec.field(default_factory=list)
 
 
@@ -187,8 +176,10 @@ class OffsetStream:
         """To the next model step: read its context, complete the samples and the curve."""
         self._check(context)
         state = self._state
-        if not state.samples:
-            self._begin(context)
+        if not state.samples and state.looked not in (0, self.preview_steps):
+            raise ValueError(f"`look` was given {state.looked} steps, expected {self.preview_steps} or none")
+        for _ in range(0 if state.samples or state.looked else self._ahead):  # as it is now, it is taken to be ahead
+            self._take(context)
         self._take(context)
         if state.factor == 1:
             state.samples = [self._sample()]
@@ -200,15 +191,6 @@ class OffsetStream:
         else:
             state.samples = [*state.samples[1:], self._sample()]
         state.curve = piece(*state.samples)
-
-    def _begin(self, context: Mapping[str, float]) -> None:
-        """Before the first step: what was not looked at is taken to be like the first context."""
-        looked = self._state.looked
-        if looked not in (0, self.preview_steps):
-            raise ValueError(f"`look` was given {looked} steps, expected {self.preview_steps} or none")
-        if not looked:
-            for _ in range(self._ahead):
-                self._take(context)
 
     def _take(self, context: Mapping[str, float]) -> None:
         """One more row of the drive itself."""
@@ -253,37 +235,28 @@ class OffsetStream:
         Raises `DriverProfileError` if the state is none, damaged, of another version, or of another profile.
         """
         try:
-            return cls._restored(profile, state)
+            saved = read_as(StreamState, unsealed(state), "state")
+            if saved.profile != sampling_hash(profile):
+                raise DriverProfileError(f"the state belongs to another profile than {profile.name}")
+            _steps_per_model_step(saved.factor / profile.model.step, profile.model.step)
+            stream = cls.__new__(cls)
+            seed = np.random.SeedSequence(saved.seed.entropy, spawn_key=saved.seed.spawn_key)
+            stream._begin_with(profile, seed, saved)
+            if saved.known is not None:
+                stream._driver = OffsetGroup(profile, saved.known, sees_ahead=True)
+                driver = DriverState(process=saved.process, mean=saved.mean, drawn=saved.drawn, row=saved.row)
+                stream._driver.go_on_from([driver], saved.responses, [seed])
+            return stream
         except DriverProfileError:
             raise
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # sealed anew by hand
             raise DriverProfileError(f"the state of an offset stream is damaged: {error!r}") from error
 
-    @classmethod
-    def _restored(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
-        saved = read_as(StreamState, unsealed(state), "state")
-        if saved.profile != sampling_hash(profile):
-            raise DriverProfileError(f"the state belongs to another profile than {profile.name}")
-        _steps_per_model_step(saved.factor / profile.model.step, profile.model.step)
-        stream = cls.__new__(cls)
-        seed = np.random.SeedSequence(saved.seed.entropy, spawn_key=saved.seed.spawn_key)
-        stream._begin_with(profile, seed, saved)
-        if saved.known is not None:
-            stream._driver = OffsetGroup(profile, saved.known, sees_ahead=True)
-            driver = DriverState(process=saved.process, mean=saved.mean, drawn=saved.drawn, row=saved.row)
-            stream._driver.go_on_from([driver], saved.responses, [seed])
-        return stream
-
 
 def sealed(values: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
-    """A state's plain values with format, version and the hash of all of it."""
+    """A state's plain values with format, version and the SHA-256 of all of it, whatever its order and layout."""
     state = {"format": form, "version": VERSION, **values}
-    return {**state, "sha256": _hash(state)}
-
-
-def _hash(state: Mapping[str, Any]) -> str:
-    """SHA-256 of a state, whatever the order and the layout of its JSON."""
-    return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
+    return {**state, "sha256": hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()}
 
 
 def unsealed(state: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
@@ -299,10 +272,10 @@ def unsealed(state: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
             f"a state written by another version of xosc-lateral (format {state.get('version')!r}; this one reads "
             f"{VERSION})"
         )
-    written = {name: value for name, value in state.items() if name != "sha256"}
-    if state.get("sha256") != _hash(written):
+    values = {name: value for name, value in state.items() if name not in ("format", "version", "sha256")}
+    if state.get("sha256") != sealed(values, form)["sha256"]:
         raise DriverProfileError(f"the state of {form.removeprefix('xosc-lateral ')} is damaged: its sha256 is another")
-    return {name: value for name, value in written.items() if name not in ("format", "version")}
+    return values
 
 
 def _steps_per_model_step(rate: float | None, step: float) -> int:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from copy import deepcopy
 from dataclasses import dataclass, field
-from hashlib import sha256
 from math import isfinite
-from os import PathLike, fspath
-from pathlib import Path
 
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.xml import parse_xml, read_document
+from xosc_lateral.files.xml import line_of
 from xosc_lateral.world.road.piecewise import Cubic
 
 XmlElement = etree._Element
@@ -86,34 +83,15 @@ class RoadFile:
         return int(value)
 
 
-def open_document(path: str | PathLike[str]) -> tuple[XmlElement, RoadFile]:
-    """Parse a file (no entities, no network, see `read_xml`); namespaces are dropped."""
-    document = read_document(Path(path))
-    source = RoadFile(fspath(path), document.sha256)
-    return _plain(document.root, source), source
-
-
-def parse_document(data: bytes, name: str) -> tuple[XmlElement, RoadFile]:
-    """Parse a document that is no file of its own, and that messages call by this name."""
-    source = RoadFile(name, sha256(data).hexdigest())
-    return _plain(parse_xml(data, name), source), source
-
-
-def _plain(root: XmlElement, source: RoadFile) -> XmlElement:
+def plain_root(root: XmlElement, path: str) -> XmlElement:
     """The root without namespaces. Raises `FormatError`: it is none of OpenDRIVE."""
     if root.tag.startswith("{"):
         root = deepcopy(root)  # the tree is shared between callers
         for element in root.iter(etree.Element):
             element.tag = element.tag.rpartition("}")[2]
     if root.tag != "OpenDRIVE":
-        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'", path=source.path, line=line_of(root))
+        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'", path=path, line=line_of(root))
     return root
-
-
-def line_of(element: XmlElement) -> int | None:
-    """Line in the file, from 1."""
-    line: object = element.sourceline  # its stub leaves the type open
-    return line if isinstance(line, int) else None
 
 
 def describe(element: XmlElement) -> str:

@@ -12,7 +12,7 @@ from xosc_lateral.world.road.lanes import LaneRecord, LaneSection, build_section
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
 from xosc_lateral.world.road.positions import RoadMark
 
-MOST_LANES = 1000
+MAXIMUM_LANE_ID = 1000
 """No lane id is further from 0: tables of lanes grow with it."""
 
 MAXIMUM_LANE_WIDTH = 1000.0
@@ -42,9 +42,8 @@ def read_sections(
     written = _read_all(road, length, source)
     directions = _directions(road, written, rule, source)
     sections = []
-    for section, lanes, end in zip(
-        written, _both_sides(written), [*(w.start for w in written[1:]), length], strict=True
-    ):
+    ends = [*(section.start for section in written[1:]), length]
+    for section, lanes, end in zip(written, _both_sides(written), ends, strict=True):
         start, marks = section.start, _until(section.centre_marks, end)
         records = [structs.replace(lane, marks=_until(lane.marks, end, start)) for lane in lanes]
         sections.append(
@@ -111,18 +110,21 @@ def _read_lane(element: XmlElement, start: float, source: RoadFile) -> LaneRecor
         for tag in ("width", "border")
     )
     lane = source.integer(element, "id")
-    if abs(lane) > MOST_LANES:
-        raise source.error(f"lane id {lane}; limit {MOST_LANES}", element)
+    if abs(lane) > MAXIMUM_LANE_ID:
+        raise source.error(f"lane id {lane}; limit {MAXIMUM_LANE_ID}", element)
     if not widths and not borders:
         source.note(f"lane {lane} has neither width nor border: taken as 0 m wide", element)
     heights = sorted(
         (start + source.number(e, "sOffset", 0.0), source.number(e, "inner", 0.0), source.number(e, "outer", 0.0))
         for e in element.iterfind("height")
     )
-    links = {
-        tag: tuple(source.integer(e, "id") for e in _permanent(element.iterfind(f"link/{tag}")))
+    speeds = sorted(
+        (start + source.number(e, "sOffset", 0.0), speed_limit(e, source)) for e in element.iterfind("speed")
+    )
+    predecessors, successors = (
+        tuple(source.integer(e, "id") for e in _permanent(element.iterfind(f"link/{tag}")))
         for tag in ("predecessor", "successor")
-    }
+    )
     return LaneRecord(
         id=lane,
         type=element.get("type", "none"),
@@ -130,21 +132,17 @@ def _read_lane(element: XmlElement, start: float, source: RoadFile) -> LaneRecor
         widths=widths,
         borders=borders,
         heights=tuple(heights),
-        speeds=tuple(
-            sorted(
-                (start + source.number(e, "sOffset", 0.0), speed_limit(e, source)) for e in element.iterfind("speed")
-            )
-        ),
+        speeds=tuple(speeds),
         marks=_read_marks(element, lane, start, source),
-        predecessors=links["predecessor"],
-        successors=links["successor"],
+        predecessors=predecessors,
+        successors=successors,
     )
 
 
 def _read_marks(element: XmlElement, lane: int, start: float, source: RoadFile) -> tuple[RoadMark, ...]:
     """Markings; each ends where the next begins, the last one at infinity until the section's end is known."""
     marks = sorted((start + source.number(e, "sOffset", 0.0), i, e) for i, e in enumerate(element.iterfind("roadMark")))
-    ends = [*(s for s, _, _ in marks[1:]), float("inf")][: len(marks)]
+    ends = [*(s for s, _, _ in marks[1:]), inf][: len(marks)]
     return tuple(
         RoadMark(lane, s, end, e.get("type", "none"), e.get("color", "standard"), source.appearance(e, "width", 0.12))
         for (s, _, e), end in zip(marks, ends, strict=True)
@@ -158,10 +156,10 @@ def _until(marks: Sequence[RoadMark], end: float, start: float = -inf) -> tuple[
     return tuple(mark._replace(s_start=max(mark.s_start, start), s_end=min(mark.s_end, end)) for mark in inside)
 
 
-def speed_limit(element: XmlElement, source: RoadFile) -> float:
-    """``speed/@max`` in m/s; inf for ``no limit`` and ``undefined``."""
-    if element.get("max", "undefined") in ("no limit", "undefined"):
-        return float("inf")
+def speed_limit(element: XmlElement | None, source: RoadFile) -> float:
+    """``speed/@max`` in m/s; inf for ``no limit`` and ``undefined``, and without the element."""
+    if element is None or element.get("max", "undefined") in ("no limit", "undefined"):
+        return inf
     unit = element.get("unit", "m/s")
     if unit not in SPEED_UNITS:
         raise source.error(f"unit={unit!r} is none of {', '.join(SPEED_UNITS)}", element)

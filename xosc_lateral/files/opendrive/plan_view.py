@@ -19,7 +19,7 @@ from xosc_lateral.files.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.world.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
 from xosc_lateral.world.road.piecewise import Cubic
 
-PIECES = 32
+PIECES_PER_ELEMENT = 32
 """Pieces of p(ds) per element. Field junctions: ds is then true to 1e-6 m, and p(ds) has no corner."""
 
 # Gauss-Legendre nodes and weights on [0, 1], 5 points: exact for polynomials of degree 9.
@@ -29,7 +29,7 @@ _NODES, _WEIGHTS = (
 
 
 def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: FloatArray) -> FloatArray:
-    """p as a function of ds: piecewise cubic over `PIECES` equal pieces of each element.
+    """p as a function of ds: piecewise cubic over `PIECES_PER_ELEMENT` equal pieces of each element.
 
     The curve's arc length over [0, p_end] is scaled to `length`, as the reference player does: files whose length
     attribute differs from it by rounding stay continuous.
@@ -45,9 +45,9 @@ def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: Fl
             total += weight * _speed(u, v, begin + node * reach)
         return total
 
-    grid = np.linspace(0.0, 1.0, PIECES + 1)
+    grid = np.linspace(0.0, 1.0, PIECES_PER_ELEMENT + 1)
     p, rows = p_end[:, None] * grid, np.arange(len(p_end))[:, None]
-    step = (p_end / PIECES)[:, None]
+    step = (p_end / PIECES_PER_ELEMENT)[:, None]
     arc = np.concatenate([np.zeros((len(p_end), 1)), np.cumsum(integral(p[:, :-1], step) * step, axis=1)], axis=1)
     total = arc[:, -1].copy()
     straight = ~(total > 0.0)[:, None]  # degenerate: the parameter runs evenly
@@ -56,7 +56,7 @@ def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: Fl
     arc = np.where(straight, target, arc * scale)
     value = np.stack([np.interp(target[i], arc[i], p[i]) for i in range(len(p_end))])
     if not straight.all():  # Newton steps on arc(p) = target, from the nearest grid point below
-        below = np.clip(np.floor(value / step).astype(int), 0, PIECES - 1)
+        below = np.clip(np.floor(value / step).astype(int), 0, PIECES_PER_ELEMENT - 1)
         origin, base = p[rows, below], arc[rows, below]
         for _ in range(4):
             reach = value - origin
@@ -67,11 +67,11 @@ def parameter_pieces(u: FloatArray, v: FloatArray, p_end: FloatArray, length: Fl
     value[:, 0], value[:, -1] = 0.0, p_end
     # dp/ds at the nodes, at most three times the neighbouring secants: p(ds) never runs back (Fritsch-Carlson)
     slope = 1.0 / (np.maximum(_speed(u, v, value), 1e-9) * scale)
-    secant = np.diff(value, axis=1) / (length / PIECES)[:, None]
+    secant = np.diff(value, axis=1) / (length / PIECES_PER_ELEMENT)[:, None]
     slope[:, :-1] = np.minimum(slope[:, :-1], 3.0 * secant)
     slope[:, 1:] = np.minimum(slope[:, 1:], 3.0 * secant)
     # Hermite's cubics
-    h, a, b = (length / PIECES)[:, None], value[:, :-1], slope[:, :-1]
+    h, a, b = (length / PIECES_PER_ELEMENT)[:, None], value[:, :-1], slope[:, :-1]
     rise, end = value[:, 1:] - a - b * h, slope[:, 1:] - b
     return np.stack([a, b, (3.0 * rise - end * h) / h**2, (end * h - 2.0 * rise) / h**3], axis=-1)
 
@@ -168,17 +168,11 @@ def finish_elements(records: Iterable[Sequence[Record]]) -> list[tuple[Reference
     """Elements of all roads, cubics run through by arc length (computed for all of them at once)."""
     roads = [[element for _, _, element in road] for road in records]
     cubics = [element for road in roads for element in road if isinstance(element, CubicRecord)]
-    done = iter(_finish_cubics(cubics))
-    return [tuple(next(done) if isinstance(e, CubicRecord) else e for e in road) for road in roads]
-
-
-def _finish_cubics(cubics: Sequence[CubicRecord]) -> list[ParamCubic]:
-    if not cubics:
-        return []
-    length = np.array([c.length for c in cubics])
-    u, v = np.array([c.u for c in cubics]), np.array([c.v for c in cubics])
-    pieces = parameter_pieces(u, v, np.array([c.p_end for c in cubics]), length)
-    return [_world(cubic, parameter.tolist()) for cubic, parameter in zip(cubics, pieces, strict=True)]
+    pieces = iter(())
+    if cubics:
+        u, v, p_end, length = (np.array([getattr(c, name) for c in cubics]) for name in ("u", "v", "p_end", "length"))
+        pieces = iter(parameter_pieces(u, v, p_end, length).tolist())
+    return [tuple(_world(e, next(pieces)) if isinstance(e, CubicRecord) else e for e in road) for road in roads]
 
 
 def _world(cubic: CubicRecord, parameter: list[list[float]]) -> ParamCubic:

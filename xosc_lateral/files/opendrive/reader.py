@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from os import PathLike
+from os import PathLike, fspath
+from pathlib import Path
 
-from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, open_document, parse_document
+from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, plain_root
 from xosc_lateral.files.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.files.opendrive.plan_view import Record, finish_elements, read_plan_view
+from xosc_lateral.files.xml import XmlDocument, document_of, read_document
 from xosc_lateral.world.road.geometry import ReferenceElement
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
@@ -25,26 +27,27 @@ MAXIMUM_ROAD_LENGTH = 1e6
 
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
-    """Read one ``.xodr``; the network's `notes` name what was repaired, ignored or degenerate.
-
-    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value.
-    """
-    return _network(*open_document(path))
+    """Read one ``.xodr``; the network's `notes` name what was repaired; `FormatError` for what can't be understood."""
+    return _network(read_document(Path(path)), fspath(path))
 
 
 def parse_opendrive(data: bytes, name: str) -> RoadNetwork:
-    """Read a road that is no file of its own, and that messages call by this name.
-
-    Raises `FormatError`: see `read_opendrive`.
-    """
-    return _network(*parse_document(data, name))
+    """Read a road that is no file of its own, and that messages call by this name; see `read_opendrive`."""
+    return _network(document_of(data, name), name)
 
 
-def _network(root: XmlElement, source: RoadFile) -> RoadNetwork:
+def _network(document: XmlDocument, path: str) -> RoadNetwork:
+    root, source = plain_root(document.root, path), RoadFile(path, document.sha256)
     elements = list(root.iterfind("road"))
     if not elements:
         raise source.error("no road", root)
-    _check_ids(elements, source)
+    seen: set[str] = set()
+    for element in elements:
+        if (road := element.get("id")) is None:
+            raise source.error("attribute 'id' is missing", element)
+        if road in seen:
+            raise source.error(f"second road with id={road!r}", element)
+        seen.add(road)
     plans = [read_plan_view(element, source) for element in elements]
     lines = finish_elements(plans)
     roads = tuple(_read_road(e, plan, line, source) for e, plan, line in zip(elements, plans, lines, strict=True))
@@ -65,17 +68,6 @@ def _network(root: XmlElement, source: RoadFile) -> RoadNetwork:
     )
 
 
-def _check_ids(elements: Sequence[XmlElement], source: RoadFile) -> None:
-    seen: set[str] = set()
-    for element in elements:
-        road = element.get("id")
-        if road is None:
-            raise source.error("attribute 'id' is missing", element)
-        if road in seen:
-            raise source.error(f"second road with id={road!r}", element)
-        seen.add(road)
-
-
 def _read_road(
     element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
 ) -> Road:
@@ -83,7 +75,12 @@ def _read_road(
     rule = element.get("rule", "RHT").upper()
     if rule not in ("RHT", "LHT"):
         raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
-    _check_places(element, plan, line, source)
+    for (s, piece, _), part in zip(plan, line, strict=True):
+        for ds in (0.0, 0.5 * piece, piece):
+            x, y, _ = part.at(ds)
+            if not max(abs(x), abs(y)) <= MAXIMUM_COORDINATE:
+                what = f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {MAXIMUM_COORDINATE:g} m"
+                raise source.error(what, element)
     sections, directions = read_sections(element, length, rule, source)
     junction = element.get("junction", "-1")
     return Road(
@@ -96,23 +93,13 @@ def _read_road(
         elements=line,
         sections=sections,
         surface=_read_surface(element, source),
-        speeds=_read_speeds(element, source),
+        speeds=tuple(
+            sorted((source.number(e, "s", 0.0), speed_limit(e.find("speed"), source)) for e in element.iterfind("type"))
+        ),
         directions=directions,
         predecessor=_read_link(element, "predecessor"),
         successor=_read_link(element, "successor"),
     )
-
-
-def _check_places(
-    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
-) -> None:
-    for (s, length, _), part in zip(plan, line, strict=True):
-        for ds in (0.0, 0.5 * length, length):
-            x, y, _ = part.at(ds)
-            if not max(abs(x), abs(y)) <= MAXIMUM_COORDINATE:
-                raise source.error(
-                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {MAXIMUM_COORDINATE:g} m", element
-                )
 
 
 def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> float:
@@ -132,15 +119,14 @@ def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> fl
 def _read_surface(element: XmlElement, source: RoadFile) -> Surface:
     crossfalls = element.findall("lateralProfile/crossfall")
     fall = [(source.number(e, "s"), source.cubic(e), e.get("side", "both")) for e in crossfalls]
+    left, right = (
+        PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != other], begin=0.0)
+        for other in ("right", "left")
+    )
     return Surface(
         elevation=_profile(element, "elevationProfile/elevation", source),
         superelevation=_profile(element, "lateralProfile/superelevation", source),
-        crossfall=(
-            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "right"], begin=0.0),
-            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "left"], begin=0.0),
-        )
-        if fall
-        else None,
+        crossfall=(left, right) if fall else None,
         shape=_read_shape(element, source),
     )
 
@@ -159,14 +145,6 @@ def _read_shape(element: XmlElement, source: RoadFile) -> Shape | None:
     ordered = sorted(stations)
     profiles = (PiecewiseCubic.from_records(stations[s], begin=min(t for t, _ in stations[s])) for s in ordered)
     return Shape(tuple(ordered), tuple(profiles))
-
-
-def _read_speeds(element: XmlElement, source: RoadFile) -> tuple[tuple[float, float], ...]:
-    speeds = []
-    for kind in element.iterfind("type"):
-        speed = kind.find("speed")
-        speeds.append((source.number(kind, "s", 0.0), float("inf") if speed is None else speed_limit(speed, source)))
-    return tuple(sorted(speeds))
 
 
 def _read_link(element: XmlElement, tag: str) -> RoadLink | None:

@@ -16,10 +16,10 @@ from xosc_lateral.files.openscenario.write.build import decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.world.road.reference_line import ReferenceLine
 
-PIECE = 50.0
+PIECE_LENGTH = 50.0
 """Of a curved reference line: a cubic through both ends with their directions is off by less than a millimetre on a
 radius of 300 m (error of Hermite's cubic, PIECE^4 / (384 R^3)). [m]"""
-WIDTH_PIECE = 25.0
+WIDTH_PIECE_LENGTH = 25.0
 """Of a width that follows the traffic, half the import's spacing of knots. [m]"""
 SHOULDER = 3.0
 """Hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31."""
@@ -133,15 +133,9 @@ def roads_xml(
 
 
 def _geometry(plan: etree._Element, piece: FloatArray) -> None:
-    s, x, y, heading, length = piece[:5]
+    digits = {"s": 6, "x": 6, "y": 6, "hdg": 9, "length": 6}
     item = sub(
-        plan,
-        "geometry",
-        s=decimal(s, 6),
-        x=decimal(x, 6),
-        y=decimal(y, 6),
-        hdg=decimal(heading, 9),
-        length=decimal(length, 6),
+        plan, "geometry", **{name: decimal(value, digits[name]) for name, value in zip(digits, piece, strict=False)}
     )
     if len(piece) == 5:
         sub(item, "line")
@@ -153,8 +147,7 @@ def _geometry(plan: etree._Element, piece: FloatArray) -> None:
 
 def _lane(side: etree._Element, number: int, lane: WrittenLane, outer: str) -> None:
     item = sub(side, "lane", id=str(number), type=lane.kind, level="false")
-    links = {"predecessor": lane.predecessor, "successor": lane.successor}
-    for tag, linked in links.items():
+    for tag, linked in (("predecessor", lane.predecessor), ("successor", lane.successor)):
         if linked is not None:
             sub(item[0] if len(item) else sub(item, "link"), tag, id=str(linked))
     for s, *cubic in lane.width:
@@ -168,7 +161,9 @@ def _cubic(values: Sequence[float]) -> dict[str, str]:
     return {name: f"{value:.9g}" for name, value in zip("abcd", values, strict=True)}
 
 
-def curved_plan(line: ReferenceLine, origin: tuple[float, float] = (0.0, 0.0), piece: float = PIECE) -> FloatArray:
+def curved_plan(
+    line: ReferenceLine, origin: tuple[float, float] = (0.0, 0.0), piece: float = PIECE_LENGTH
+) -> FloatArray:
     """A smooth line as cubic pieces of about that length [m], shape (n, 10); see `WrittenRoad.plan`."""
     edges = np.linspace(0.0, line.length, max(1, round(line.length / piece)) + 1)
     place, way = line.place(edges, 0) - np.array(origin), line.place(edges, 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cache, partial, reduce
 from operator import or_
 from types import NoneType, UnionType
@@ -13,9 +12,8 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_typ
 from msgspec import NODEFAULT, UNSET, Struct, structs
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.catalogs import Catalogs
-from xosc_lateral.files.openscenario.declarations import local_scope, parameter_name
 from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.references import Catalogs, local_scope, parameter_name
 from xosc_lateral.world.scenario.place import Place, Unsupported, Xml
 from xosc_lateral.world.scenario.position import Position, Shape
 
@@ -63,10 +61,7 @@ class Context:
         self.remarks.append(Unsupported(element.tag, element.place(), reason))
 
     def inline_or_entry(self, owner: XmlElement, tag: str) -> XmlElement:
-        """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared.
-
-        `owner` holds an element of that tag or a reference to one.
-        """
+        """The element of that tag that `owner` holds or refers to, in the scope of its own and assigned parameters."""
         inline = owner.child(tag)
         if inline is not None:
             return inline.within(local_scope(inline))
@@ -170,13 +165,7 @@ def _value(e: XmlElement, name: str, kind: type[Any], xml: Xml, context: Context
         return parameter_name(e.raw(name) or e.text(name))
     if xml.is_road:
         return e.text(name).removesuffix(ZERO_DECIMALS)
-    if issubclass(kind, StrEnum):
-        return e.optional_choice(name, kind)
-    if kind is bool:
-        return e.optional_boolean(name)
-    if kind is int:
-        return e.optional_integer(name)
-    return e.optional_number(name, finite=xml.finite) if kind is float else e.optional_text(name)
+    return e.optional(name, kind, finite=xml.finite)
 
 
 def _below(e: XmlElement | None, above: list[str]) -> XmlElement | None:

@@ -15,9 +15,8 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
-from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
+from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
-from xosc_lateral.files.openscenario.declarations import broken_constraint, declared_values, parameter_name, value_of
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.read import open_scenario, read_header
 from xosc_lateral.files.xml import read_xml
@@ -38,16 +37,10 @@ class LogicalScenario:
     scenario_file: Path  # the scenario that it varies
     distribution: Deterministic | Stochastic
     place: Place  # of the distribution
-    _scenario: XmlElement = field(repr=False)
+    _declared: Mapping[str, str] = field(repr=False)  # what the scenario declares
+    _constrained: list[XmlElement] = field(repr=False)  # those declarations that have a constraint group
     discarded: int = 0  # parameter sets left out so far because they violate the scenario's constraint groups
-    _declared: dict[str, str] = field(init=False, repr=False)
-    _constrained: list[XmlElement] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Find what the scenario declares, and which of it is constrained."""
-        self._declared = declared_values(self._scenario)
-        declared = self._scenario.listed("ParameterDeclarations", "ParameterDeclaration")
-        self._constrained = [item for item in declared if item.child("ConstraintGroup") is not None]
+    _begin: float = field(init=False, repr=False, default=0.0)
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
         """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
@@ -57,25 +50,16 @@ class LogicalScenario:
 
         Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
         """
-        self.discarded, begin = 0, time.monotonic()
+        self.discarded, self._begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
         if self.count > limit.value:
             raise self.place.error(limit.refusal(self.count))
         if isinstance(self.distribution, Deterministic):
-            for values in self.distribution:
-                if self._accepts(values):
-                    yield values
-                self._check_time(begin)
+            yield from filter(self._accepts, self.distribution)
             return
         rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
         for _ in range(self.distribution.number_of_test_runs):
             yield self._draw(self.distribution, rng)
-            self._check_time(begin)
-
-    def _check_time(self, begin: float) -> None:
-        took = time.monotonic() - begin
-        if took > DISTRIBUTION_TIME.value:
-            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
 
     @property
     def count(self) -> int:
@@ -95,6 +79,9 @@ class LogicalScenario:
         raise self.place.error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
 
     def _accepts(self, values: ParameterSet) -> bool:
+        took = time.monotonic() - self._begin
+        if took > DISTRIBUTION_TIME.value:
+            raise self.place.error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
         for name in values:
             if name not in self._declared:
                 raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
@@ -103,39 +90,44 @@ class LogicalScenario:
         scope = Scope({**self._declared, **values})
         for declaration in self._constrained:
             item = declaration.within(scope)
-            if broken_constraint(item, value_of(item)):
+            if references.broken_constraint(item, references.value_of(item)):
                 self.discarded += 1
                 return False
         return True
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
-    """Read a ParameterValueDistribution file (1.1 and later); its scenario may lie in the `allowed` folders, too.
-
-    Raises `FormatError` with file, line and element; user-defined distributions among others.
-    """
+    """Read a ParameterValueDistribution file (1.1 and later); its scenario may lie in the `allowed` folders, too."""
     path = Path(path)
     document, _ = read_xml(path)
     root = open_scenario(document, path)
     header = read_header(root)
     owner = root.required("ParameterValueDistribution")
     reference = owner.required("ScenarioFile")
-    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    boundary = references.Boundary(path.parent, references.allowed_roots(path, allowed))
     scenario = boundary.inside(reference.text("filepath"), reference.place())
     if not scenario.is_file():
         reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
     content = owner.required("Deterministic", "Stochastic")
-    context = Context(header.version, Catalogs({}, boundary, []), [], {})
+    context = Context(header.version, references.Catalogs({}, boundary, []), [], {})
     distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content, context)
-    inner, _ = read_xml(scenario)
-    return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
+    inner = open_scenario(read_xml(scenario)[0], scenario)
+    declared = inner.listed("ParameterDeclarations", "ParameterDeclaration")
+    constrained = [item for item in declared if item.child("ConstraintGroup") is not None]
+    values = references.declared_values(inner)
+    return LogicalScenario(path, scenario, distribution, content.place(), values, constrained)
 
 
 def _deterministic(owner: XmlElement) -> Deterministic:
     parts: list[ValueSets | SteppedRange] = []
     for item in owner.children():
         if item.tag == "DeterministicMultiParameterDistribution":
-            parts.append(_value_sets(item.required("ValueSetDistribution")))
+            holder = item.required("ValueSetDistribution")
+            sets = [
+                {_name_of(a, "parameterRef"): a.text("value") for a in value_set.children("ParameterAssignment")}
+                for value_set in holder.children("ParameterValueSet")
+            ]
+            parts.append(ValueSets(tuple(sets), holder.place()))
         elif item.tag == "DeterministicSingleParameterDistribution":
             parts.append(_single(item))
         else:
@@ -143,17 +135,9 @@ def _deterministic(owner: XmlElement) -> Deterministic:
     return Deterministic(tuple(parts))
 
 
-def _value_sets(owner: XmlElement) -> ValueSets:
-    sets = tuple(
-        {_name_of(a, "parameterRef"): a.text("value") for a in item.children("ParameterAssignment")}
-        for item in owner.children("ParameterValueSet")
-    )
-    return ValueSets(sets, owner.place())
-
-
 def _name_of(element: XmlElement, attribute: str) -> str:
     """Name of a parameter: never a reference, even where a file writes it with a ``$``."""
-    return parameter_name(element.raw(attribute) or element.text(attribute))
+    return references.parameter_name(element.raw(attribute) or element.text(attribute))
 
 
 def _single(item: XmlElement) -> ValueSets | SteppedRange:
@@ -188,7 +172,7 @@ def _decimal(element: XmlElement, name: str) -> Decimal:
 
 
 def _stochastic(owner: XmlElement, context: Context) -> Stochastic:
-    runs = owner.integer("numberOfTestRuns")
+    runs = owner.value("numberOfTestRuns", int)
     if runs < 0:
         owner.fail(f"numberOfTestRuns of {runs} is negative")
     draws = []

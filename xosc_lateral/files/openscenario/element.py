@@ -6,15 +6,15 @@ import math
 from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
-from typing import NoReturn, TypeVar, cast
+from typing import Any, NoReturn, TypeVar, cast
 
 from lxml import etree
 
+from xosc_lateral.files.xml import line_of
 from xosc_lateral.world.scenario.enums import SYNONYMS
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.place import Place
 
-E = TypeVar("E", bound=StrEnum)
 V = TypeVar("V")
 
 MAXIMUM_NUMBER = 1e15
@@ -30,10 +30,7 @@ def means_true(text: str) -> bool:
 
 
 class XmlElement:
-    """An element of the scenario or of a catalog, in the scope that its attributes are read in.
-
-    Optional attributes: `default` comes back where the attribute is missing or empty. Required ones raise.
-    """
+    """An element of the scenario or of a catalog, in the scope that its attributes are read in."""
 
     __slots__ = ("path", "scope", "xml")
 
@@ -104,65 +101,48 @@ class XmlElement:
             self.fail(f"{name}='{text[:60]}' is implausibly large (at most {MAXIMUM_NUMBER:g})")
         return value
 
-    def optional_integer(self, name: str) -> int | None:
-        """Attribute as a whole number; ``2.0000000000`` of an expression is one."""
-        value = self.optional_number(name)
-        if value is None:
-            return None
-        if value != round(value) or abs(value) > 2**53:
-            self.fail(f"{name}='{self.text(name)}' is not a whole number")
-        return round(value)
+    def optional(self, name: str, kind: type[V], *, finite: bool = True) -> V | None:
+        """Attribute as a text, number, whole number, truth value or option code; None where it is missing.
 
-    def optional_boolean(self, name: str) -> bool | None:
-        """Attribute as a truth value, in any case and as 0 and 1; None where it is missing or empty."""
-        text = self.optional_text(name)
-        if text is None or not text.strip():
-            return None
-        if means_true(text):
-            return True
-        if text.strip().lower() in _FALSE:
-            return False
-        self.fail(f"{name}='{text[:60]}' is neither true nor false")
-
-    def optional_choice(self, name: str, kind: type[E]) -> E | None:
-        """Attribute as an option code; None where it is missing or empty. The case of letters does not count."""
-        text = self.optional_text(name)
-        if text is None or not text.strip():
-            return None
+        ``2.0000000000`` of an expression is a whole number. Truth values and codes may be in any case, and empty, which
+        is missing, too.
+        """
+        value: Any = self.optional_text(name)
+        text = str(value or "")
         word = text.strip()
-        older = SYNONYMS.get(kind, {}).get(word)
-        if older is not None:
-            return cast("E", older)
-        for member in kind:
-            if member.value.lower() == word.lower():
-                return member
-        self.fail(f"{name}='{text[:60]}' is none of {', '.join(kind)}")
+        if value is not None and kind in (int, float):
+            value = self.optional_number(name, finite=finite)
+            if kind is int and (value != round(value) or abs(value) > 2**53):
+                self.fail(f"{name}='{text}' is not a whole number")
+            value = round(value) if kind is int else value
+        elif kind is not str and not word:
+            value = None
+        elif kind is bool:
+            if word.lower() not in _TRUE | _FALSE:
+                self.fail(f"{name}='{text[:60]}' is neither true nor false")
+            value = means_true(word)
+        elif issubclass(kind, StrEnum):
+            codes = {code.lower(): code for code in kind}
+            value = SYNONYMS.get(kind, {}).get(word) or codes.get(word.lower())
+            if value is None:
+                self.fail(f"{name}='{text[:60]}' is none of {', '.join(kind)}")
+        return cast("V | None", value)
 
-    def text(self, name: str, default: str | None = None) -> str:
-        """Attribute as text."""
-        return self._required(name, self.optional_text(name), default)
-
-    def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:
-        """Attribute as a number."""
-        return self._required(name, self.optional_number(name, finite=finite), default)
-
-    def integer(self, name: str, default: int | None = None) -> int:
-        """Attribute as a whole number."""
-        return self._required(name, self.optional_integer(name), default)
-
-    def boolean(self, name: str, default: bool | None = None) -> bool:
-        """Attribute as a truth value."""
-        return self._required(name, self.optional_boolean(name), default)
-
-    def choice(self, name: str, kind: type[E], default: E | None = None) -> E:
-        """Attribute as an option code."""
-        return self._required(name, self.optional_choice(name, kind), default)
-
-    def _required(self, name: str, value: V | None, default: V | None) -> V:
+    def value(self, name: str, kind: type[V], default: V | None = None, *, finite: bool = True) -> V:
+        """Attribute as `optional` has it, or the default; an error without either."""
+        value = self.optional(name, kind, finite=finite)
         value = default if value is None else value
         if value is None:
             self.fail(f"attribute '{name}' is missing")
         return value
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """Attribute as text."""
+        return self.value(name, str, default)
+
+    def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:
+        """Attribute as a number."""
+        return self.value(name, float, default, finite=finite)
 
     # --- place --------------------------------------------------------------------------------------------------
 
@@ -211,11 +191,6 @@ def parent_of(xml: etree._Element) -> etree._Element:
     parent = xml.getparent()
     assert parent is not None
     return parent
-
-
-def line_of(xml: etree._Element) -> int | None:
-    """Line in the file, from 1; None for an element that was made, not read."""
-    return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there
 
 
 def node_of(xml: etree._Element) -> tuple[int, ...]:

@@ -7,15 +7,15 @@ from datetime import datetime
 from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
-from xosc_lateral.files.openscenario.context import Context, read_struct
-from xosc_lateral.files.openscenario.declarations import local_scope
+from xosc_lateral.files.openscenario.context import Context, Reader, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.references import local_scope
 from xosc_lateral.world.scenario.entity import USUAL_BOX, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, TimeOfDay, Weather
 
 
-def read_environment(owner: XmlElement, context: Context) -> Environment:
+def _read_environment(owner: XmlElement, context: Context) -> Environment:
     """Environment inline or from a catalog; a missing catalog is remarked, and leaves everything as it is."""
     environment = owner.child("Environment")
     if environment is not None:
@@ -48,7 +48,7 @@ def _time_of_day(element: XmlElement, context: Context) -> TimeOfDay | None:
     if moment is None:
         context.remark(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
         return None
-    return TimeOfDay(moment, element.boolean("animation", False))
+    return TimeOfDay(moment, element.value("animation", bool, False))
 
 
 def _weather(element: XmlElement, context: Context) -> Weather:
@@ -96,7 +96,7 @@ def _read_selections(owner: XmlElement, entities: list[Entity], context: Context
                 name = member.text("entityRef")
                 members.extend(selections[name] if name in selections else (context.entity(member),))
             elif member.tag == "ByType":
-                wanted = member.choice("objectType", EntityCategory)
+                wanted = member.value("objectType", EntityCategory)
                 members.extend(entity.name for entity in entities if entity.category is wanted)
         name = selection.text("name")
         if name in context.entities or name in selections:
@@ -125,6 +125,11 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     if category is None:
         item.fail(f"catalog entry '{content.raw('name')}' is a {content.tag}, which can't be a scenario object")
     trailer, inner = _read_trailer(content, name, context)
+    vehicle_category = VehicleCategory.CAR if category is EntityCategory.VEHICLE else None
+    try:
+        vehicle_category = vehicle_category and content.value("vehicleCategory", VehicleCategory, vehicle_category)
+    except FormatError as error:
+        context.remark(content, f"{error.what}: taken as a car")
     entity = read_struct(
         Entity,
         content,
@@ -132,16 +137,16 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
         name=name,
         category=category,
         place=item.place(),
-        vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
+        vehicle_category=vehicle_category,
         controllers=tuple(
             replace(controller, object_name=owner.optional_text("name"))
             for owner in item.children("ObjectController")
-            if (controller := read_controller(owner, context)) is not None
+            if (controller := _read_controller(owner, context)) is not None
         ),
         trailer=trailer,
         hitch_x=_coupling(content, "TrailerHitch"),
         coupler_x=_coupling(content, "TrailerCoupler"),
-        properties=read_properties(content),
+        properties=_read_properties(content),
     )
     return [entity, *inner]
 
@@ -157,14 +162,6 @@ def _stand_in(reference: XmlElement, name: str, context: Context, error: Missing
         vehicle_category=VehicleCategory.CAR,
         object_name=reference.text("entryName"),
     )
-
-
-def _vehicle_category(vehicle: XmlElement, context: Context) -> VehicleCategory:
-    try:
-        return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
-    except FormatError as error:
-        context.remark(vehicle, f"{error.what}: taken as a car")
-        return VehicleCategory.CAR
 
 
 def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
@@ -196,7 +193,7 @@ def _coupling(vehicle: XmlElement, tag: str) -> float | None:
     return None if element is None else element.number("dx")
 
 
-def read_bounding_box(element: XmlElement, context: Context) -> BoundingBox:
+def _read_bounding_box(element: XmlElement, context: Context) -> BoundingBox:
     """None of its sizes is negative."""
     box = read_struct(BoundingBox, element, context)
     if min(box.length, box.width, box.height) < 0:
@@ -205,7 +202,7 @@ def read_bounding_box(element: XmlElement, context: Context) -> BoundingBox:
     return box
 
 
-def read_performance(element: XmlElement, context: Context) -> Performance:
+def _read_performance(element: XmlElement, context: Context) -> Performance:
     """Limits that the standard asks for are remarked where they are missing."""
     inf = float("inf")
     usual = {"maxSpeed": inf, "maxAcceleration": USUAL_ACCELERATION, "maxDeceleration": USUAL_ACCELERATION}
@@ -220,7 +217,7 @@ def read_performance(element: XmlElement, context: Context) -> Performance:
     return Performance(*limits.values())
 
 
-def read_controller(owner: XmlElement, context: Context) -> Controller | None:
+def _read_controller(owner: XmlElement, context: Context) -> Controller | None:
     """Controller inline, from a catalog, or in an ObjectController (1.3 actions). Motion does not depend on it."""
     owner = owner.child("ObjectController") or owner
     inline, reference = owner.child("Controller"), owner.child("CatalogReference")
@@ -233,9 +230,17 @@ def read_controller(owner: XmlElement, context: Context) -> Controller | None:
         controller = entry
     else:
         return None
-    return Controller(controller.text("name", ""), place, read_properties(controller))
+    return Controller(controller.text("name", ""), place, _read_properties(controller))
 
 
-def read_properties(owner: XmlElement) -> dict[str, str]:
+def _read_properties(owner: XmlElement) -> dict[str, str]:
     """Name and value pairs of a ``Properties`` child."""
     return {item.text("name", ""): item.text("value", "") for item in owner.listed("Properties", "Property")}
+
+
+READERS: dict[object, Reader] = {
+    BoundingBox: _read_bounding_box,
+    Controller: _read_controller,
+    Environment: _read_environment,
+    Performance: _read_performance,
+}

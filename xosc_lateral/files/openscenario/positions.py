@@ -47,7 +47,7 @@ def _shape(owner: XmlElement, context: Context) -> Shape:
 
 
 def _relative_lane(e: XmlElement, context: Context) -> places.RelativeLanePosition:
-    ds, lanes = e.optional_number("ds"), e.optional_integer("dLane")
+    ds, lanes = e.optional_number("ds"), e.optional("dLane", int)
     if ds is None and e.optional_number("dsLane") is None:
         ds = _number_or_zero(e, "ds", context)
     if lanes is None:
@@ -72,18 +72,14 @@ def _route(e: XmlElement, context: Context) -> places.RoutePosition:
     reference, owner = e.child("RouteRef"), e.child("InRoutePosition")
     route = read_route(reference, context) if reference is not None else None
     content = owner.child() if owner is not None else None
-    place = _in_route(content, context) if content else None
+    reader = None if content is None else _IN_ROUTE.get(content.tag)
+    if content is not None and reader is None:
+        context.remark(content)
+    place = None if content is None or reader is None else reader(content, context)
     return read_struct(places.RoutePosition, e, context, route=route, in_route=place)
 
 
 _IN_ROUTE = declared(places.FromCurrentEntity, places.FromRoadCoordinates, places.FromLaneCoordinates)
-
-
-def _in_route(e: XmlElement, context: Context) -> Any:
-    reader = _IN_ROUTE.get(e.tag)
-    if reader is None:
-        context.remark(e)
-    return None if reader is None else reader(e, context)
 
 
 def _geo(e: XmlElement, context: Context) -> places.GeoPosition:

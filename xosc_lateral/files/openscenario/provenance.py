@@ -16,13 +16,14 @@ from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import replace_atomically
-from xosc_lateral.files.openscenario.element import line_of
+from xosc_lateral.files.source import hash_of
+from xosc_lateral.files.xml import line_of
 
 MARK = "xosc-lateral provenance: "
 HEADER_MARK = "[xosc-lateral: "
-CONTENT = "content_sha256"
+CONTENT_HASH_NAME = "content_sha256"
 """In the provenance: SHA-256 of the file without the provenance."""
-PENDING = "0" * 64
+PENDING_HASH = "0" * 64
 """In its place until it is known."""
 _COMMENT_START, _COMMENT_END = f"<!-- {MARK}".encode(), b"-->"
 
@@ -31,7 +32,9 @@ def mark(root: etree._Element, provenance: Mapping[str, Any], summary: str) -> N
     """Write the provenance as a comment before the file header, and in short into its description."""
     header = root.find("{*}FileHeader")
     text = json.dumps(provenance, sort_keys=True, ensure_ascii=False, default=str)
-    comment = etree.Comment(f" {MARK}{_comment_safe(text)} ")
+    for _ in range(2):  # no ``--`` may stand in a comment, nor may it end in a dash
+        text = text.replace("--", "-\\u002d")
+    comment = etree.Comment(f" {MARK}{text} ")
     comment.tail = root.text  # the white space before the first child
     root.insert(0 if header is None else root.index(header), comment)
     if header is not None:
@@ -64,8 +67,8 @@ def facts_in(data: bytes) -> Mapping[str, Any] | None:
 
 
 def content_hash(data: bytes) -> str:
-    """SHA-256 of a file of ours without its provenance, in hexadecimal."""
-    return hashlib.sha256(without_provenance(data)).hexdigest()
+    """`hash_of` a file of ours without its provenance."""
+    return hash_of(without_provenance(data))
 
 
 def without_provenance(data: bytes) -> bytes:
@@ -75,7 +78,7 @@ def without_provenance(data: bytes) -> bytes:
 
 
 def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[str, str, bytes]:
-    """Write a document with the hash of its content in place of `PENDING`, which its provenance holds.
+    """Write a document with the hash of its content in place of `PENDING_HASH`, which its provenance holds.
 
     The provenance is in the first piece. SHA-256 of the file and of its content come back, and the file itself where it
     is not to be saved.
@@ -83,7 +86,7 @@ def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[st
     rest = iter(pieces)
     first = next(rest)
     begin, end = _comment_in(first)
-    place = first.find(PENDING.encode(), begin, end)
+    place = first.find(PENDING_HASH.encode(), begin, end)
     digest = hashlib.sha256(first[:begin])
     digest.update(first[end:])
 
@@ -133,8 +136,3 @@ def refuse_converted(root: etree._Element, path: object) -> None:
     header = root.find("{*}FileHeader")
     line = None if header is None else line_of(header)
     raise FormatError(f"was converted by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
-
-
-def _comment_safe(text: str) -> str:
-    """JSON in which no ``--`` stands, which would end the comment, and which does not end in a dash."""
-    return text.replace("--", "-\\u002d").replace("--", "-\\u002d")

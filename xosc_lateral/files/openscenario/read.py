@@ -10,12 +10,12 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.actions import READERS
-from xosc_lateral.files.openscenario.catalogs import Boundary, Catalogs, allowed_roots
+from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
-from xosc_lateral.files.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.files.openscenario.entities import read_entities
+from xosc_lateral.files.openscenario.references import Boundary
+from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
@@ -62,10 +62,7 @@ LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its 
 
 
 class RoadSearch(Struct, frozen=True):
-    """Where a road may lie besides where the scenario says: what the user names is allowed.
-
-    Raises `FormatError`: No such file, no such folder.
-    """
+    """Where a road may lie besides where the scenario says; `FormatError` where there is no such file or folder."""
 
     file: Path | None = None  # the road, whatever the scenario says
     folders: tuple[Path, ...] = ()  # looked through for a file of the road's name
@@ -114,11 +111,11 @@ def read_scenario(
             Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}")
         )
     remarks.extend(remark_spellings(root))
-    scope, values = read_declarations(root, dict(parameters or {}), remarks)
+    scope, values = references.read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)
-    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
     locations = _catalog_locations(root)
-    catalogs = Catalogs(locations, boundary, remarks)
+    catalogs = references.Catalogs(locations, boundary, remarks)
     context = Context(
         header.version,
         catalogs,
@@ -143,7 +140,7 @@ def read_scenario(
         path=path,
         header=header,
         parameters=values,
-        variables=read_variables(root),
+        variables=references.read_variables(root),
         catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
         road_file=road_file,
         traffic_signal_controllers=controllers,
@@ -170,8 +167,8 @@ def read_header(root: XmlElement) -> FileHeader:
         root.fail("FileHeader is missing")
     # tools have written "1+" for what came after 1.1
     minor_text = header.text("revMinor", "0").strip()
-    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.integer("revMinor", 0)
-    major = header.integer("revMajor", 1)
+    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.value("revMinor", int, 0)
+    major = header.value("revMajor", int, 1)
     if major != 1:
         header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are, later 1.x as 1.3")
     return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
@@ -190,10 +187,7 @@ def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
 def _road_file(
     logic: XmlElement, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
 ) -> Path:
-    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
-
-    Scenarios for CARLA name a town, without a suffix.
-    """
+    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
     place, name = logic.place(), PureWindowsPath(written.strip()).name
     try:
         road = boundary.inside(written, place)

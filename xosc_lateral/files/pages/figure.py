@@ -44,16 +44,16 @@ CSS_VARIABLES: Mapping[str, str] = {
 FONT = "system-ui, sans-serif"
 
 # Size of texts; heights of a title, an axis' label, a row of the legend, the numbers below a panel. [pt]
-TEXT, TITLE, LABEL, LEGEND, NUMBERS = 9.0, 17.0, 14.0, 17.0, 12.0
+TEXT_SIZE, TITLE_HEIGHT, LABEL_HEIGHT, LEGEND_HEIGHT, NUMBERS_HEIGHT = 9.0, 17.0, 14.0, 17.0, 12.0
 
 PANEL_SPACING = 9.0  # Free space between panels, and around them. [pt]
-PADDING = 0.04  # Share of an axis that is left free on either side of the data. [-]
-WIDTH = 660.0  # Width of a figure that fills the text column. [pt]
+AXIS_PADDING = 0.04  # Share of an axis that is left free on either side of the data. [-]
+FIGURE_WIDTH = 660.0  # Width of a figure that fills the text column. [pt]
 
 
 def text_width(text: str) -> float:
     """Of a text in a sans-serif font, estimated: 0.56 of its size a letter, wide scripts its size. [pt]"""
-    return TEXT * sum(1.0 if unicodedata.east_asian_width(letter) in "WF" else 0.56 for letter in text)
+    return TEXT_SIZE * sum(1.0 if unicodedata.east_asian_width(letter) in "WF" else 0.56 for letter in text)
 
 
 @dataclass(slots=True, repr=False)
@@ -63,7 +63,7 @@ class Figure:
     rows: int = 1
     columns: int = 1
     height: float = 150.0  # Of one panel without its title and labels. [pt]
-    width: float = WIDTH  # Of the whole figure. [pt]
+    width: float = FIGURE_WIDTH  # Of the whole figure. [pt]
     share_x: Literal["", "all"] = ""
     share_y: Literal["", "all"] = ""
     """Whether all panels have the same limits; tick labels stand once then, below each column or beside each row."""
@@ -114,9 +114,9 @@ def _limits(values: FloatArray, log: bool) -> tuple[float, float]:
         return (1.0, 10.0) if log else (0.0, 1.0)
     low, high = float(seen.min()), float(seen.max())
     if log:
-        room = (high / low) ** PADDING if high > low else 2.0
+        room = (high / low) ** AXIS_PADDING if high > low else 2.0
         return low / room, high * room
-    room = PADDING * (high - low) or max(abs(high), 1.0) * PADDING
+    room = AXIS_PADDING * (high - low) or max(abs(high), 1.0) * AXIS_PADDING
     return low - room, high + room
 
 
@@ -127,7 +127,7 @@ def svg_of(figure: Figure, alt: str = "", *, themed: bool = False) -> str:
     left, right = _margins(figure)
     inner = (figure.width - sum(left) - right - (figure.columns - 1) * PANEL_SPACING) / figure.columns
     body, height = _body(figure, left, inner)
-    head = f'viewBox="0 0 {figure.width:g} {height:g}" role="img" aria-label="{escape(alt)}" font-size="{TEXT:g}"'
+    head = f'viewBox="0 0 {figure.width:g} {height:g}" role="img" aria-label="{escape(alt)}" font-size="{TEXT_SIZE:g}"'
     title = f"<title>{escape(alt)}</title>" if alt else ""
     if themed:
         body = re.sub(r'"(#[0-9a-f]{6})"', lambda m: f'"var({CSS_VARIABLES[m[1]]})"', body)
@@ -162,7 +162,7 @@ def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
             figure.panels[(number + 1) * figure.columns + column :: figure.columns] for column in range(len(panels))
         ]
         numbered = [not figure.share_x or not any(each.marks for each in others) for others in below]
-        top += TITLE if any(panel.title for panel in panels) else 0.0
+        top += TITLE_HEIGHT if any(panel.title for panel in panels) else 0.0
         at = 0.0
         for column, panel in enumerate(panels):
             at += left[column]
@@ -173,7 +173,7 @@ def _body(figure: Figure, left: list[float], inner: float) -> tuple[str, float]:
             at += inner + PANEL_SPACING
         top += figure.height + edge
         if figure.axes and any(numbered):
-            top += NUMBERS + (LABEL if any(panel.x.label for panel in panels) else 0.0)
+            top += NUMBERS_HEIGHT + (LABEL_HEIGHT if any(panel.x.label for panel in panels) else 0.0)
     return "".join(parts), round(top, 1)
 
 
@@ -184,11 +184,11 @@ def _text(x: float, y: float, text: str, anchor: str = "middle", more: str = "")
 def _legend(figure: Figure, left: float) -> tuple[str, float]:
     """A key for each label, in rows, and their height. [pt]"""
     keys = {mark.label: mark for panel in figure.panels for mark in panel.marks if mark.label}
-    parts, x, y = [], left, LEGEND
+    parts, x, y = [], left, LEGEND_HEIGHT
     for label, mark in keys.items():
         needed = text_width(label) + 34.0
         if x + needed > figure.width and x > left:
-            x, y = left, y + LEGEND
+            x, y = left, y + LEGEND_HEIGHT
         if mark.kind == "dots":
             parts.append(f'<circle cx="{x + 8:.1f}" cy="{y - 3:.1f}" r="{0.5 * mark.width:g}" fill="{mark.color}"/>')
         elif mark.kind == "area":

@@ -147,7 +147,7 @@ class Page:
         self._main.append(
             f'<div class="player" aria-label="{escape(label)}">'
             "<noscript>The player needs JavaScript; the figures below show the same.</noscript></div>\n"
-            f'<script type="application/json" id="{anchor}">{scene}</script>{KEYS}'
+            f'<script type="application/json" id="{anchor}">{scene}</script>{PLAYER_KEYS}'
         )
 
     def html(self, provenance: Mapping[str, object]) -> str:
@@ -188,7 +188,7 @@ class Page:
             self._scripts.append(script)
 
 
-KEYS = (
+PLAYER_KEYS = (
     '<details class="keys"><summary>Keys</summary><p>Space: play or pause. ← →: 0.1 s back or on, with Shift 1 s. '
     "↑ ↓: lateral stretch. + −: zoom. F: follow the next vehicle. 0: show everything. Home, End: start and end. In a "
     "figure over time: click to take the player to that time.</p></details>"

@@ -20,7 +20,7 @@ from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
 from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
-from xosc_lateral.workflows.batch.jobs import Batch, Job
+from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
 from xosc_lateral.workflows.batch.journal import Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, Timing, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
@@ -28,7 +28,7 @@ from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
 
-STATE = ".xosc-lateral"
+STATE_FOLDER = ".xosc-lateral"
 """Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
 
 _STOPPING = frozenset(
@@ -50,7 +50,7 @@ class JobState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class JobOutcome:
-    """What became of a job."""
+    """What became of a job, and its row of the manifest."""
 
     state: JobState
     row: ManifestRow
@@ -91,11 +91,7 @@ def convert_many(
     Raises `FolderInUseError`: another run writes into the folder; `BatchStoppedError`: the folder can't be written, the
     disk is full; `ClusterError`: the cluster can't be reached, is gone, or has another version of this package.
     """
-    if converter is None:
-        from xosc_lateral.workflows.batch.convert_job import convert_job
-
-        converter = convert_job
-    work = partial(_run_job, converter, limits or JobLimits())
+    work = partial(_run_job, converter or convert_job, limits or JobLimits())
     new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
     try:
         try:
@@ -111,7 +107,7 @@ def convert_many(
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
     finally:
-        _remove_empty([batch.folder / STATE, *new])
+        _remove_empty([batch.folder / STATE_FOLDER, *new])
 
 
 def _outcomes(
@@ -122,7 +118,7 @@ def _outcomes(
     keep_old: bool,
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
-    state = batch.folder / STATE
+    state = batch.folder / STATE_FOLDER
     with folder_lock(state / "lock") as runs, ExitStack() as stack:
         stack.callback(_sweep, batch.folder, runs[:1])
         _sweep(batch.folder, runs[1:])

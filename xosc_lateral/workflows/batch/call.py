@@ -2,51 +2,65 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
+from urllib.parse import quote
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.signals import Interrupted
+from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
-from xosc_lateral.workflows.batch.convert_job import write_batch_index
 from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.options import spelled_out
+from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
 if TYPE_CHECKING:
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
+BATCH = "Batches"
+"""Heading of their options on the command line."""
+
+
 @spelled_out(ConvertSettings)
+@declare_options
 def convert_many(
     scenarios: ScenariosLike,
-    output: PathLike,
-    *,
-    variants: int = 1,
-    report: PathLike | None = None,
-    workers: int = 1,
-    cluster: str | None = None,
-    job_timeout: float = JOB_TIMEOUT.value,
-    job_memory: float = JOB_MEMORY.value,
-    keep_old: bool = False,
+    output: PathLike, *,
+    variants: Annotated[int, flag(help="Number of outputs, each with different offsets.", min=1)] = 1,
+    report: Annotated[PathLike | None, flag(kind=str | None, metavar="PAGE.html",
+        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
+    workers: Annotated[int, flag("--jobs", read=process_count, help="Number of processes; -1: one per core.",
+        rich_help_panel=BATCH)] = 1,
+    job_timeout: Annotated[float, flag(help="Time limit per scenario [s].", min=1, max=86_400,
+        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, flag(help="Memory limit per scenario [MB].", min=100, max=1e6,
+        rich_help_panel=BATCH)] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, flag(metavar="ADDRESS", help="Address of a dask scheduler.",
+        rich_help_panel=BATCH)] = None,
+    keep_old: Annotated[bool, flag("--keep-old", help="Leave outputs of older inputs or versions alone.",
+        rich_help_panel=BATCH)] = False,
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
     **options: Unpack[ConvertKeywords],
-) -> BatchResult:
+) -> BatchResult:  # fmt: skip
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 
     Parameters
@@ -56,14 +70,8 @@ def convert_many(
         if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    variants : int
-        Outputs per scenario, each with offsets of its own.
     report : str or Path, optional
         Folder for a page per output, and an ``index.html`` that lists what needs attention first.
-    workers : int
-        Processes; -1: one per core.
-    cluster : str, optional
-        Address of a dask.distributed scheduler to work on.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
     keep_old : bool
@@ -138,15 +146,13 @@ def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
     return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
 
 
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class BatchResult(Result):
     """What became of a batch; of single outputs, `to_frame` and `to_dict` read it from the manifest."""
 
-    __slots__ = ("_batch", "_summary", "report")
-
-    def __init__(self, batch: Batch, summary: Summary, report: Path | None) -> None:
-        self._batch, self._summary = batch, summary
-        self.report = report
-        """Index of the pages, if there are any."""
+    _batch: Batch
+    _summary: Summary
+    report: Path | None  # index of the pages, if there are any
 
     @property
     def folder(self) -> Path:
@@ -219,3 +225,67 @@ def _left_out(batch: Batch) -> str:
     kinds = Counter(kind.value for _, kind in batch.left_out)
     listed = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
     return f"; left out: {listed}" if listed else ""
+
+
+# ---- index of pages ----
+INDEX_PAGE = "index.html"
+
+GAP_COLUMNS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
+
+
+def write_batch_index(batch: Batch, folder: Path) -> Path:
+    """Write ``index.html`` over the pages of a finished batch, what needs attention first."""
+    pages = {job.name: job.page for job in batch.jobs if job.page is not None}
+    rows = [row for row in read_manifest(batch.folder / MANIFEST) if row.output in pages]
+    links = {row.output: quote(Path(os.path.relpath(pages[row.output], folder)).as_posix())
+             for row in rows if not row.error}  # fmt: skip
+    return write_atomically(folder / INDEX_PAGE, batch_page(rows, links, batch.folder.name))
+
+
+def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str) -> str:
+    """HTML index of a batch; same rows, same bytes. `links`: output -> its page; `name`: of the output folder."""
+    ranked = sorted(rows, key=_urgency)
+    failed, contacts = sum(bool(row.error) for row in rows), sum(map(_has_new_contact, rows))
+    page = Page(f"Batch {name}")
+    page.lead(
+        "All outputs of the batch: failures first, then scenarios in which vehicles collide that did not before, then "
+        "the others by number of warnings. The pictures show the paths from above, with the scale across the road "
+        "exaggerated."
+    )
+    page.key_figures(
+        [
+            KeyFigure(len(rows) - failed, "outputs"),
+            KeyFigure(failed, "failed", tone="bad" if failed else ""),
+            KeyFigure(contacts, "with collisions", "that the nominal motion does not have", "bad" if contacts else ""),
+            KeyFigure(sum(bool(row.warnings) for row in rows), "with warnings"),
+        ]
+    )
+    tones: dict[int, Tone] = {k: "bad" for k, row in enumerate(ranked) if row.error or _has_new_contact(row)}
+    formats = dict.fromkeys(("std. deviation of offsets [m]", *GAP_COLUMNS), ".2f")
+    page.table([_cells(row, links.get(row.output, "")) for row in ranked], "Outputs", formats=formats, tones=tones)
+    return page.html({})
+
+
+def _has_new_contact(row: ManifestRow) -> bool:
+    """Whether vehicles touch that nominally don't."""
+    before = float("inf") if row.gap_before is None else row.gap_before
+    return row.gap_after is not None and row.gap_after <= 0.0 < before
+
+
+def _urgency(row: ManifestRow) -> tuple[int, int, str]:
+    return 0 if row.error else 1 if _has_new_contact(row) else 2, -len(row.warnings), row.output
+
+
+def _cells(row: ManifestRow, link: str) -> dict[str, object]:
+    name, done, anchor = escape(row.output), not row.error, f'<a href="{escape(link)}">'
+    picture = escape(f"{link.removesuffix('.html')}.svg")
+    image = f'<img loading="lazy" width="200" height="64" src="{picture}" alt="Paths in {name}">'
+    return {
+        "paths": Html(f"{anchor}{image}</a>" if link else ""),
+        "output": Html(f"{anchor}{name}</a>" if link else name),
+        "enriched": f"{len(row.enriched)} of {row.entities}" if done else None,
+        "std. deviation of offsets [m]": row.offset_spread if done else None,
+        GAP_COLUMNS[0]: row.gap_before if done else None,
+        GAP_COLUMNS[1]: row.gap_after if done else None,
+        "warnings": "; ".join(row.warnings) or "none" if done else f"failed: {row.error}",
+    }

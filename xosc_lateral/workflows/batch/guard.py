@@ -1,8 +1,7 @@
 """One job within limits of time and memory: what exceeds them ends as an error of that job.
 
-A thread beside the job watches both and raises an exception inside it; a job that does not even come to that (stuck in
-a library's code) takes its worker process with it, and the batch counts that as its row. Memory is limited by the
-system as well (`RLIMIT_AS`), so that one call that asks for too much fails at once.
+A thread beside the job raises it inside; a job stuck in a library's code takes its worker process with it, which is its
+row. The system limits memory as well (`RLIMIT_AS`), so that one call that asks for too much fails at once.
 """
 
 from __future__ import annotations
@@ -44,10 +43,10 @@ def address_space(megabytes: float) -> Iterator[None]:
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-POLL = 0.2
+WATCH_INTERVAL = 0.2
 """How often time and memory are looked at. [s]"""
 
-GRACE = 30.0
+ENDING_TIME = 30.0
 """A job that has not ended so long after it was told to takes its worker process with it. [s]"""
 
 _worker_may_die = False
@@ -112,10 +111,10 @@ class _Watch:
             self._ended.set()
             raise
         if self.why:  # raised already or about to be: here, and not somewhere after us
-            time.sleep(POLL)
+            time.sleep(WATCH_INTERVAL)
 
     def _run(self) -> None:
-        while not self._ended.wait(POLL):
+        while not self._ended.wait(WATCH_INTERVAL):
             why = self._exceeded()
             if not why:
                 continue
@@ -124,7 +123,7 @@ class _Watch:
                     return
                 self.why = why
                 ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._job), ctypes.py_object(_Interrupted))
-            if not self._ended.wait(GRACE) and _worker_may_die:
+            if not self._ended.wait(ENDING_TIME) and _worker_may_die:
                 os._exit(1)
             return
 

@@ -1,25 +1,29 @@
-"""A batch as a list of jobs: every output with its place in the tree, its settings and a fingerprint of them."""
+"""A batch as a list of jobs, every output with its place in the tree and its settings; and what makes one of them."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.openscenario.catalogs import require_folders
+from xosc_lateral.files.atomic import make_own_folder, write_atomically
+from xosc_lateral.files.openscenario.references import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
 from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
-from xosc_lateral.workflows.conversion.convert import numbered
+from xosc_lateral.workflows.conversion.conversion import Conversion
+from xosc_lateral.workflows.conversion.convert import convert_scenario, numbered
 from xosc_lateral.workflows.conversion.plan import hidden_by_libraries
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 
@@ -42,11 +46,10 @@ class Job:
 
     def row(self, error: str = "") -> ManifestRow:
         """Its row as far as it is known before the conversion; no hash of a scenario that can't be read."""
-        scenario_sha256 = _hash_or(self.source, "")
         return ManifestRow(
             output=self.name,
             scenario=self.scenario,
-            scenario_sha256=scenario_sha256,
+            scenario_sha256=_hash_or(self.source, ""),
             variant=self.variant + 1,
             seed=self.settings.seed,
             profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
@@ -86,13 +89,11 @@ def plan_batch(
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
-    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with settings of their own
+    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with `settings` of their own
     - `folder`: output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db``
-      becomes ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-      distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table with settings of its own becomes
-      ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says
-    - `settings`: for every input that has none of its own
-    - `variants`: outputs per scenario
+      becomes ``folder/a/x.xosc``, of its `variants` the first ``x_01.xosc``, the first scenario of a parameter value
+      distribution ``x_p00000.xosc``, a row of a table with settings of its own ``x_PROFILE_HASH.xosc``: its profile,
+      and a hash of what else it says
     - `report`: folder for a report page per output, in a tree like that of the outputs
 
     Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
@@ -107,7 +108,7 @@ def plan_batch(
     listed = ([it] if isinstance(it, Request) else find_requests(it, settings, variants, root) for it in inputs)
     requests = [_absolute(request) for part in listed for request in part]
     base = _common_folder(requests)
-    fingerprints = _Fingerprints()
+    fingerprints = Fingerprints()
     jobs: dict[str, Job] = {}
     left_out: list[tuple[Path, DocumentKind]] = []
     asked: dict[Path, set[tuple[str, int, str]]] = {}
@@ -133,7 +134,10 @@ def plan_batch(
                 raise FormatError(what, path=job.output)
             if len(jobs) > BATCH_JOBS.value:
                 raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
-    _refuse_overwriting(jobs.values())
+    sources, folders = set(map(os.path.realpath, {job.source for job in jobs.values()})), dict[Path, str]()
+    for job in jobs.values():
+        if real_path(job.output, folders) in sources:
+            raise FormatError("is an input: choose another output folder", path=job.output)
     planned = [jobs[name] for name in sorted(jobs)]
     if report is not None:
         pages = _normal(Path(report))
@@ -164,7 +168,7 @@ def _common_folder(requests: Sequence[Request]) -> Path:
         raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
 
 
-def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
+def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for source, suffix, settings, error in concrete(request, kind):
@@ -188,28 +192,18 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
             )
 
 
-def _refuse_overwriting(jobs: Iterable[Job]) -> None:
-    jobs = list(jobs)
-    sources = set(map(os.path.realpath, {job.source for job in jobs}))
-    folders: dict[Path, str] = {}
-    for job in jobs:
-        if real_path(job.output, folders) in sources:
-            raise FormatError("is an input: choose another output folder", path=job.output)
-
-
-def fingerprint(settings: ConvertSettings, variant: int) -> str:
-    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now."""
-    return _Fingerprints().of(settings, variant)
-
-
 @dataclass(slots=True)
-class _Fingerprints:
-    """Hashes of settings; files that they name count by their bytes, not by their place."""
+class Fingerprints:
+    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now.
+
+    Files that settings name count by their bytes, not by their place.
+    """
 
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
     _last: tuple[ConvertSettings, dict[str, str]] | None = None
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
+        """Of settings and a variant, from 0."""
         if self._last is None or self._last[0] is not settings:  # variants come one after another
             self._last = settings, self._texts(settings)
         texts = self._last[1] | {"variant": str(variant)}
@@ -222,7 +216,7 @@ class _Fingerprints:
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         for name, path in (("context", settings.context), ("road", settings.road)):
-            values[name] = None if path is None else _hash_or(path, MISSING)
+            values[name] = None if path is None else _hash_or(path, MISSING_HASH)
         return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
@@ -232,9 +226,9 @@ class _Fingerprints:
         if key not in self._profiles:
             try:  # "auto": that of what it chooses
                 path = find_profile(AUTO_PROFILE if name == AUTO else name, libraries)
-                self._profiles[key] = _hash_or(path, MISSING)
+                self._profiles[key] = _hash_or(path, MISSING_HASH)
             except (XoscLateralError, OSError):
-                self._profiles[key] = MISSING
+                self._profiles[key] = MISSING_HASH
         return self._profiles[key]
 
 
@@ -246,5 +240,68 @@ def _hash_or(path: Path, otherwise: str) -> str:
         return otherwise
 
 
-MISSING = "missing"
+MISSING_HASH = "missing"
 """In place of the hash of a file that can't be read: its conversion says why, and the others go on."""
+
+
+def convert_job(job: Job) -> ManifestRow:
+    """Convert and describe; `XoscLateralError`: the input is at fault, `OSError`: the output can't be written."""
+    _refuse_changes(job)
+    for path in filter(None, (job.output, job.page)):
+        make_own_folder(path.parent, depth=job.name.count("/"))
+    conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
+    _refuse_changes(job)
+    if job.page is not None:
+        from xosc_lateral.workflows.conversion.page import conversion_page
+        from xosc_lateral.workflows.playing.figures import thumbnail
+
+        write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # stands for it in the index
+        write_atomically(job.page, conversion_page(conversion))
+    return _described(job, conversion)
+
+
+def _refuse_changes(job: Job) -> None:
+    """The row states the profiles and the context table that the run was planned with."""
+    if Fingerprints().of(job.settings, job.variant) != job.fingerprint:
+        raise FormatError("profile or context table changed during the run; run it again", path=job.source)
+
+
+def _described(job: Job, conversion: Conversion) -> ManifestRow:
+    """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
+    enriched, provenance = conversion.movement, conversion.provenance
+    before, after = (None if gap is None else _rounded(gap) for gap in conversion.smallest_gap)
+    inputs = {
+        Path(os.path.relpath(os.path.normpath(job.source.parent / name), job.base)).as_posix(): sha256
+        for name, sha256 in sorted(provenance.inputs.items())
+    }
+    road = next((name for name in inputs if name.lower().endswith(".xodr")), "")
+    offsets = [segment.offset for entity in enriched.entities for segment in entity.segments]
+    return replace(
+        job.row(),
+        scenario_sha256=provenance.inputs.get(job.source.name, ""),
+        output_sha256=conversion.sha256,
+        road=road,
+        road_sha256=inputs.get(road, ""),
+        inputs=inputs,
+        profiles={entity: name for entity, (name, _) in sorted(provenance.profiles.items())},
+        profile_sha256=dict(sorted(provenance.profiles.values())),
+        entities=len(enriched.entities),
+        enriched=tuple(entity.name for entity in enriched.entities if entity.is_enriched),
+        why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
+        segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
+        offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
+        gap_before=before,
+        gap_after=after,
+        warnings=conversion.warnings,
+        version=provenance.version,
+        mode=provenance.mode,
+        modes=dict(provenance.modes),
+        ego=provenance.ego,
+        content_sha256=provenance.content_sha256,
+        cut_off=enriched.motion.cut_off is not None,
+    )
+
+
+def _rounded(value: float | np.floating) -> float:
+    """To a micrometre or microsecond: what a manifest is read for, and no noise of another machine's last bit."""
+    return round(float(value), 6)

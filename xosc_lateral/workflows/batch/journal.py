@@ -16,17 +16,8 @@ from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.files.atomic import open_own
-from xosc_lateral.workflows.batch.manifest import (
-    MANIFEST,
-    TIMINGS,
-    ManifestRow,
-    Timing,
-    is_of_now,
-    read_manifest,
-    read_timings,
-    write_manifest,
-    write_timings,
-)
+from xosc_lateral.workflows.batch import manifest
+from xosc_lateral.workflows.batch.manifest import MANIFEST, TIMINGS, ManifestRow, Timing
 
 
 class FolderInUseError(XoscLateralError):
@@ -37,9 +28,8 @@ class FolderInUseError(XoscLateralError):
 def folder_lock(path: Path) -> Iterator[Sequence[str]]:
     """Hold a lock file while the block runs; gives ids: that of this run, then those of killed runs before it.
 
-    The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
-    killed run has left is no obstacle. What the file says (process and host) is for the message, and the ids for what
-    killed runs have left half-written.
+    The operating system's lock counts, which goes with the process; what the file says (process and host) is for the
+    message, and the ids for what killed runs have left half-written.
 
     Raises `FolderInUseError`: when another process holds it; `FormatError`: it is a link or somebody else's; `OSError`:
     when the folder can't be written.
@@ -170,10 +160,7 @@ class Journal:
         return self._timings.get(output, Timing())
 
     def add(self, row: ManifestRow, timing: Timing) -> None:
-        """Append a row. From the return on it survives the death of this process.
-
-        Raises `OSError`: when the disk is full; rows added before are still there.
-        """
+        """Append a row, which survives the death of this process; `OSError` on a full disk, earlier rows stay."""
         self._changed = True
         line = json.dumps({"row": row.to_dict(), **timing._asdict()}).encode() + b"\n"
         self._file.seek(self._end)
@@ -189,14 +176,12 @@ class Journal:
         del self._begin[output]
 
     def finish(self) -> None:
-        """Write manifest and timings, sorted by output, if they change; then the journal goes.
-
-        A kill in between leaves a journal that says the same as the manifest.
-        """
+        """Write manifest and timings, sorted by output, if they change; then the journal goes, which says the same."""
         if self._changed:
             outputs, now = sorted(self._begin), time.time_ns()
-            write_timings(((output, _known(self._timings[output], now)) for output in outputs), self._folder / TIMINGS)
-            write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
+            timings = ((output, _known(self._timings[output], now)) for output in outputs)
+            manifest.write_timings(timings, self._folder / TIMINGS)
+            manifest.write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
         self._file.close()
         self._path.unlink()
 
@@ -219,12 +204,12 @@ class Journal:
         recovered = bool(self._begin)
         timings, timings_path, path = dict[str, Timing](), self._folder / TIMINGS, self._folder / MANIFEST
         with self._put_aside_if_damaged(TIMINGS):
-            timings = read_timings(timings_path)
+            timings = manifest.read_timings(timings_path)
         with self._put_aside_if_damaged(MANIFEST):
-            for row in read_manifest(path):
+            for row in manifest.read_manifest(path):
                 if row.output not in self._begin:
                     self.add(row, timings.get(row.output, Timing()))
-        self._changed = recovered or not (timings_path.exists() and path.exists() and is_of_now(path))
+        self._changed = recovered or not (timings_path.exists() and path.exists() and manifest.is_of_now(path))
 
     @contextmanager
     def _put_aside_if_damaged(self, name: str) -> Iterator[None]:

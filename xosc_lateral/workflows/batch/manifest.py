@@ -98,10 +98,7 @@ class ManifestRow:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
-        """Read what `to_dict` gave; names that are unknown are left out.
-
-        Raises `ValueError`: when a value is missing or of the wrong kind.
-        """
+        """What `to_dict` gave, without unknown names; `ValueError` for a value that is missing or of the wrong kind."""
         import msgspec
 
         if not isinstance(values, Mapping):
@@ -138,10 +135,7 @@ def manifest_schema() -> pa.Schema:
 
 
 def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
-    """Write rows in the order given, `ROW_GROUP` at a time; a file that would not change is left alone.
-
-    Raises `OSError`: the old manifest is still there.
-    """
+    """Write rows in the order given, `ROW_GROUP` at a time; a file that would not change is left alone."""
     _write_table(path, manifest_schema(), map(_packed, rows))
 
 

@@ -19,16 +19,12 @@ LINES_EVERY = 30.0
 
 
 class Display(StrEnum):
-    """How a batch is followed.
+    """How a batch is followed; failures are a line each unless it is by nothing."""
 
-    `AUTO`: a bar on a terminal, a line now and then elsewhere; `JSON`: an object a line for every output, at the start
-    and at the end; `NOTHING`: for callers that look at the outcomes themselves. Failures are a line each but there.
-    """
-
-    AUTO = "auto"
+    AUTO = "auto"  # a bar on a terminal, a line now and then elsewhere
     QUIET = "quiet"
-    JSON = "json"
-    NOTHING = "nothing"
+    JSON = "json"  # an object a line for every output, at the start and at the end
+    NOTHING = "nothing"  # for callers that look at the outcomes themselves
 
 
 @dataclass(slots=True)
@@ -130,10 +126,7 @@ def follow(
     stream: TextIO | None = None,
     report: Callable[[JobOutcome], object] | None = None,
 ) -> Summary:
-    """Run a batch to its end and show how it goes, on standard error unless on a `stream`.
-
-    `outcomes`: from `convert_many`; `total`: how many there will be; `report`: gets each.
-    """
+    """Run a batch of `total` outcomes to its end; show how it goes, on standard error or a `stream`; report each."""
     stream = stream or sys.stderr
     summary = Summary(total)
     start = time.monotonic()

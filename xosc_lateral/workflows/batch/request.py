@@ -77,24 +77,15 @@ _GLOB_CHARACTERS = frozenset("*?[")
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One scenario to convert.
-
-    - `scenario`: a scenario, or a parameter value distribution that stands for several
-    - `variants`: outputs per scenario, each with offsets of its own
-    - `base`: folder whose layout below the output tree mirrors; None: the scenario's own
-    - `listed`: named one by one. What was merely found in a folder is left out if it is a catalog or was converted
-      already
-    - `label`: tells outputs of this scenario with these settings from its others: part of their names
-    - `name`: in place of the scenario's name and the label
-    """
+    """One scenario to convert, or a parameter value distribution that stands for several."""
 
     scenario: Path
     settings: ConvertSettings = field(default_factory=ConvertSettings)
-    variants: int = 1
-    base: Path | None = None
-    listed: bool = True
-    label: str = ""
-    name: str = ""
+    variants: int = 1  # outputs per scenario, each with offsets of its own
+    base: Path | None = None  # folder whose layout below the output tree mirrors; None: the scenario's own
+    listed: bool = True  # named one by one; of what was found in a folder, catalogs and converted scenarios stay out
+    label: str = ""  # tells outputs of this scenario with these settings from its others: part of their names
+    name: str = ""  # in place of the scenario's name and the label
 
 
 def concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, ConvertSettings, str]]:

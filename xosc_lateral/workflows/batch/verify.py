@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
@@ -16,18 +15,18 @@ from typing import Annotated, Any, NamedTuple
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
-from xosc_lateral.files.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
+from xosc_lateral.files.openscenario.provenance import CONTENT_HASH_NAME, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
 from xosc_lateral.files.profiles import profile_hash, read_profile
-from xosc_lateral.files.source import check_regular, file_hash, read_source
+from xosc_lateral.files.source import check_regular, file_hash, hash_of, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
 from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
-from xosc_lateral.workflows.batch.jobs import Batch, Job, fingerprint
+from xosc_lateral.workflows.batch.jobs import Batch, Fingerprints, Job
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
-from xosc_lateral.workflows.options import declare_options, flag
+from xosc_lateral.workflows.options import declare_options, flag, process_count
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
@@ -56,13 +55,12 @@ class Checked:
     problems: tuple[Defect, ...] = ()
 
 
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Verification(Result):
     """Outputs, and what is wrong with which."""
 
-    __slots__ = ("_done", "checked")
-
-    def __init__(self, checked: Sequence[Checked], done: str) -> None:
-        self.checked, self._done = tuple(checked), done
+    checked: tuple[Checked, ...]
+    _done: str
 
     @property
     def failing(self) -> tuple[Checked, ...]:
@@ -166,7 +164,7 @@ def verify(
                 defects = [(Problem.FAILED, str(defects))]
             checked[number] = Checked(task.path, tuple(defects))
     done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
-    return Verification([checked[number] for number, _ in tasks], done)
+    return Verification(tuple(checked[number] for number, _ in tasks), done)
 
 
 class _Task(NamedTuple):
@@ -225,7 +223,7 @@ def _check(search: ConvertSettings, fast: bool, task: _Task) -> list[Defect]:
 def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
     """What a row of a manifest says otherwise than its output."""
     facts = origin.facts
-    if hashlib.sha256(data).hexdigest() != row.output_sha256:
+    if hash_of(data) != row.output_sha256:
         yield "output_sha256"
     stated = {"seed": origin.settings.seed, "variant": origin.variant, "options": facts["options"]}
     stated |= {name: facts.get(name) for name in ("behaviour", "content_sha256", "package_version")}
@@ -244,7 +242,7 @@ def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     same = without_provenance(made) == without_provenance(data)
     problems = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
     names = sorted(name for name in stated.keys() | now.keys() if stated.get(name) != now.get(name))
-    names = [name for name in names if name not in (CONTENT, "package_version")]
+    names = [name for name in names if name not in (CONTENT_HASH_NAME, "package_version")]
     problems += [(Problem.EDITED, f"its provenance states another {name}") for name in names]
     return problems or [(Problem.EDITED, "its provenance is not as it was written")]
 
@@ -257,7 +255,7 @@ def _version_of(facts: Mapping[str, Any]) -> bytes:
 def _changes(data: bytes, origin: _Origin) -> list[Defect]:
     """What was edited in an output, and what would come out otherwise today, and why."""
     facts, problems = origin.facts, list[Defect]()
-    if facts.get(CONTENT) != content_hash(data):
+    if facts.get(CONTENT_HASH_NAME) != content_hash(data):
         problems.append((Problem.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
         made = f"behaviour {facts.get('behaviour')} of version {facts.get('package_version')}"
@@ -289,7 +287,9 @@ def reproduce(
     library: Paths = (),
     allow: Paths = (),
     road_path: Paths = (),
-    workers: int = 1,
+    workers: Annotated[
+        int, flag("--jobs", read=process_count, help="Of a folder: number of processes; -1: one per core.")
+    ] = 1,
     force: bool = False,
 ) -> Verification:
     """Make an output again from what it carries, or all outputs of a folder with a manifest, and compare the content.
@@ -320,11 +320,11 @@ def reproduce(
     if target.resolve() == old.resolve():
         raise FormatError("is what is to be made again: choose another output", path=target)
     if old.is_dir():
-        return Verification(list(_reproduce_folder(old, target.absolute(), search, workers)), _SAME)
+        return Verification(tuple(_reproduce_folder(old, target.absolute(), search, workers)), _SAME)
     claim([target], [old], force=force)
     origin = _Origin.of(old, read_source(old).data, search)
     convert_scenario(origin.scenario, target, origin.settings, variant_index=origin.variant - 1)
-    return Verification([_compared(old, target, origin)], _SAME)
+    return Verification((_compared(old, target, origin),), _SAME)
 
 
 _SAME = "outputs came out the same again"
@@ -352,7 +352,7 @@ def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers:
                 base=base,
                 settings=origin.settings,
                 variant=origin.variant - 1,
-                fingerprint=fingerprint(origin.settings, origin.variant - 1),
+                fingerprint=Fingerprints().of(origin.settings, origin.variant - 1),
             )
         )
     base = Path(os.path.commonpath([job.base for job in jobs])) if jobs else new

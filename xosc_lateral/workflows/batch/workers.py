@@ -12,6 +12,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
@@ -221,10 +222,12 @@ class _Cluster(Pool):
             raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
 
     def lost(self, error: BaseException) -> bool:
-        from distributed import KilledWorker
+        from distributed import KilledWorker, cfexecutor
 
         self.recover()
-        return isinstance(error, KilledWorker | CancelledError)
+        # dask's executor itself fails where a result comes at the very moment in which its worker dies
+        innermost = [call.filename for call in traceback.extract_tb(error.__traceback__)[-1:]]
+        return isinstance(error, KilledWorker | CancelledError) or innermost == [cfexecutor.__file__]
 
     def check(self) -> None:
         self.recover()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.options import STEP

@@ -10,8 +10,7 @@ import numpy as np
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario, Enriched, EntityResult
 from xosc_lateral.workflows.playing import figures as figures
-from xosc_lateral.workflows.playing.figures import COMFORTABLE
-from xosc_lateral.workflows.playing.page import add_notes
+from xosc_lateral.workflows.playing.figures import USUAL_ACCELERATION, add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, closest_following, road_path
 
@@ -135,7 +134,7 @@ def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -
         page.table(
             [_entity_row(entity) for entity in done],
             "Enriched entities. Acceleration and jerk are lateral, and what enriching adds to the nominal path.",
-            formats={"time [s]": ".1f", f"> {COMFORTABLE} m/s² [%]": ".1f"},
+            formats={"time [s]": ".1f", f"> {USUAL_ACCELERATION} m/s² [%]": ".1f"},
         )
     others = [{"entity": one.name, "reason": one.why} for one in enriched.entities if not one.is_enriched]
     if others:
@@ -155,8 +154,8 @@ def _add_dynamics(page: Page, enriched: Enriched, done: Sequence[EntityResult]) 
         page.figure(
             figures.accelerations_over_time(enriched, _with_largest_offsets(done, MOST_DYNAMICS)),
             "Lateral acceleration beyond what curves and lane changes require. Dashed: "
-            f"{COMFORTABLE} m/s² to either side, which real drivers rarely exceed while they keep their lane. Grey: "
-            "not road-following."
+            f"{USUAL_ACCELERATION} m/s² to either side, which real drivers rarely exceed while they keep their lane. "
+            "Grey: not road-following."
             f"{_left_out(done, MOST_DYNAMICS)}",
             "Added lateral acceleration over time",
             over_time=True,
@@ -273,7 +272,7 @@ def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFi
         return []
     offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])
     added = np.concatenate([np.abs(entity.lateral_acceleration()) for entity in done])
-    rough = float(np.mean(added > COMFORTABLE))
+    rough = float(np.mean(added > USUAL_ACCELERATION))
     figures_ = [
         KeyFigure(f"{sum(entity.segment_seconds for entity in done):.0f} s", "road-following, all entities together"),
         KeyFigure(
@@ -282,7 +281,8 @@ def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFi
         KeyFigure(
             f"{added.max():.2f} m/s²",
             "largest added lateral acceleration",
-            f"above {COMFORTABLE} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in their lane",
+            f"above {USUAL_ACCELERATION} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in "
+            "their lane",
             "bad" if rough > ROUGH_SHARE else "",
         ),
     ]
@@ -308,7 +308,7 @@ def _entity_row(entity: EntityResult) -> dict[str, object]:
         "max. offset [m]": float(np.abs(entity.deviation).max()),
         "acc. rms [m/s²]": float(np.sqrt(np.mean(added**2))),
         "acc. max. [m/s²]": float(added.max()),
-        f"> {COMFORTABLE} m/s² [%]": 100.0 * float(np.mean(added > COMFORTABLE)),
+        f"> {USUAL_ACCELERATION} m/s² [%]": 100.0 * float(np.mean(added > USUAL_ACCELERATION)),
         "jerk rms [m/s³]": float(np.sqrt(np.mean(jerk**2))),
     }
 

@@ -43,20 +43,13 @@ class OutputMode(StrEnum):
     LANE_OFFSET = "lane-offset"
 
 
+@say.documented
 @dataclass(frozen=True, slots=True)
 class ConvertSettings:
     """Settings of one conversion, as plain values that a batch can send and hash.
 
     Parameters
     ----------
-    profile : DriverProfile, path or name
-        Of every vehicle; "auto": the shipped population's, `motorway`.
-    seed : int
-        Same inputs, seed and variant: same bytes.
-    entity : mapping of str to DriverProfile, path or name
-        Entity -> profile, before `profile`.
-    only : collection of str
-        Enrich these alone; the others stay as they are.
     ego : collection of str
         Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
         external controller, CARLA's `ego_vehicle`); ("none",): there is none.
@@ -67,12 +60,6 @@ class ConvertSettings:
         The way across of lane changes and lane offsets of 3 to 13 s, where a vehicle follows a trajectory: as written,
         or as drivers take it (a bell that is slightly early); start, duration and lane stay the file's. Without: as
         configured, else "written".
-    context : str or Path
-        Table of context over time that the scenario doesn't state: `time` [s], and a column each.
-    parameters : mapping
-        Scenario parameters that replace those declared.
-    library : path or paths
-        Folders with further profiles.
     mode : {"auto", "trajectory", "lane-offset"}
         Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
         those whose motion depends on a vehicle under test.
@@ -81,16 +68,8 @@ class ConvertSettings:
     version : str
         Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
         or left out and named in `Conversion.warnings`.
-    allow : path or paths
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    road : str or Path
-        OpenDRIVE file, whatever the scenario says.
-    road_path : path or paths
-        Folders with roads that a scenario knows by name ("Town04").
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
-    time_limit : float
-        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
         driver alone is written.

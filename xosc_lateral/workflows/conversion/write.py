@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import BEHAVIOUR, __version__
-from xosc_lateral.files.openscenario.provenance import PENDING
+from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import named
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
@@ -87,7 +87,7 @@ def write(plan: Plan, sampled: Enriched) -> Written:
         version=named(plan.version),
         ego=tuple(plan.egos),
         modes={},
-        content_sha256=PENDING,
+        content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
     chains = [chain for entity in reactive for chain in _chains_of(entity, plan)]
@@ -102,7 +102,7 @@ def write_with(
     modes |= dict.fromkeys(vehicles.trajectories, OutputMode.TRAJECTORY.value)
     enriched = sorted(entity.name for entity in sampled.entities if entity.is_enriched)
     modes = {name: modes[name] for name in enriched if name in modes}
-    provenance = replace(provenance, modes=modes, content_sha256=PENDING)
+    provenance = replace(provenance, modes=modes, content_sha256=PENDING_HASH)
     names = ", ".join(sorted({name for name, _ in provenance.profiles.values()})) or "no profile"
     sensor = ", with sensor" if plan.settings.with_sensor else ""
     file = write_converted(

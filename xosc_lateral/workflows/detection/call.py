@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.detection.sources import SourceSettings
 
 ALL_RULES = "all"
-TRAINED = "logistic"
+TRAINED_RULE = "logistic"
 
 
 def _known_sensor(text: str) -> str:
@@ -130,8 +130,8 @@ def _read_detector(word: str, threshold: float, answer_time: float) -> Detector 
     name, _, options = word.partition(":")
     if word == ALL_RULES:
         return None
-    if name == TRAINED:
-        return read_numbers(options, {"threshold": (1e-6, 1.0 - 1e-6)}, TRAINED).get("threshold", 0.5)
+    if name == TRAINED_RULE:
+        return read_numbers(options, {"threshold": (1e-6, 1.0 - 1e-6)}, TRAINED_RULE).get("threshold", 0.5)
     return read_rule(word) or Command(word, threshold, answer_time)
 
 
@@ -157,7 +157,7 @@ def _detectors(
             return
         detector = 0.5
     if not trainers:
-        raise ValueError(f"{TRAINED} has to be trained: name a source with --train")
+        raise ValueError(f"{TRAINED_RULE} has to be trained: name a source with --train")
     as_they_are = replace(settings, variants=0)
     views = _training_views(trainers, as_they_are, sensor, seed)
     yield train(views, detector, ", ".join(path.name for path in trainers))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import Sensor
@@ -52,9 +53,7 @@ class Detection(Result):
         return f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
 
     def __str__(self) -> str:
-        rows = [HEADINGS, *(cells(row) for row in self.rows())]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(HEADINGS))]
-        lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        lines = aligned([HEADINGS, *(cells(row) for row in self.rows())])
         return "\n".join([self.headline(), "", *lines, "", *self.notes()])
 
     def notes(self) -> Sequence[str]:

@@ -15,11 +15,11 @@ from xosc_lateral.workflows.detection.tracks import STEP, Scene
 
 FEATURES = ("position", "lateral speed", "lateral acceleration", "mean lateral speed", "movement", "unrest")
 """Now; over the last second: the mean lateral speed, and the means of the amounts of speed and acceleration."""
-WINDOW = round(1.0 / STEP)
+WINDOW_ROWS = round(1.0 / STEP)
 """[rows]"""
-EVERY = round(0.2 / STEP)
+ROW_STRIDE = round(0.2 / STEP)
 """Rows that are trained on: rows nearer to each other say the same. [rows]"""
-PENALTY = 1.0
+RIDGE_PENALTY = 1.0
 """Of half the squared coefficients of standardised features, beside a log-likelihood in which both classes weigh as
 much as all rows of the rarer one: keeps separable classes (lane-centre traffic) finite."""
 NEWTON_STEPS = 50
@@ -35,7 +35,7 @@ def features(view: View) -> FloatArray:
 def _last_second(values: FloatArray) -> FloatArray:
     sums = np.cumsum(np.r_[0.0, values])
     rows = np.arange(1, len(values) + 1)
-    first = np.maximum(rows - WINDOW, 0)
+    first = np.maximum(rows - WINDOW_ROWS, 0)
     return np.asarray((sums[rows] - sums[first]) / (rows - first))
 
 
@@ -60,7 +60,7 @@ def fit_regression(columns: FloatArray, positive: BoolArray) -> Regression:
     design = np.column_stack([np.ones(len(columns)), (columns - mean) / scale])
     counts = positive.sum(), (~positive).sum()
     weight = min(counts) * np.where(positive, 1.0 / counts[0], 1.0 / counts[1])
-    penalty = np.diag([0.0, *[PENALTY] * columns.shape[1]])
+    penalty = np.diag([0.0, *[RIDGE_PENALTY] * columns.shape[1]])
     beta = np.zeros(design.shape[1])
     for _ in range(NEWTON_STEPS):
         odds = np.clip(design @ beta, -30.0, 30.0)
@@ -111,7 +111,7 @@ def training_rows(views: Iterable[View]) -> tuple[FloatArray, BoolArray]:
             if change.side == view.side and view.watched[change.begin]:
                 changing[change.begin + 1 : change.crossing + 1] = True
         rows = np.flatnonzero(keeping | changing)
-        rows = rows[rows % EVERY == 0]
+        rows = rows[rows % ROW_STRIDE == 0]
         columns.append(features(view)[rows])
         positive.append(changing[rows])
     if not columns:
@@ -123,7 +123,8 @@ def train(views: Iterable[View], threshold: float, source: str) -> Logistic:
     """The detector of a source's views; raises `NotEnoughDataError` where there is no cut-in, or nothing else."""
     columns, positive = training_rows(views)
     counts = int(positive.sum()), int((~positive).sum())
-    if min(counts) * EVERY < WINDOW:
-        amounts = f"{counts[0] * EVERY * STEP:.1f} s of cut-ins and {counts[1] * EVERY * STEP:.1f} s of lane keeping"
+    if min(counts) * ROW_STRIDE < WINDOW_ROWS:
+        cut_ins, keeping = (count * ROW_STRIDE * STEP for count in counts)
+        amounts = f"{cut_ins:.1f} s of cut-ins and {keeping:.1f} s of lane keeping"
         raise NotEnoughDataError(f"{source}: {amounts}, training needs 1 s of each")
     return Logistic(fit_regression(columns, positive), threshold)

@@ -16,7 +16,7 @@ RATE_WINDOW = 0.5
 speed: what is known of one second, as a tracker knows it. [s]"""
 WATCHED_DISTANCE = 150.0
 """Vehicles farther ahead are not watched: 5 s at 30 m/s, as in `recordings.encounters`. [m]"""
-ACROSS = 30.0
+CARRIAGEWAY_DISTANCE = 30.0
 """Vehicles of different roads farther apart across are on other carriageways. [m]"""
 
 
@@ -43,7 +43,7 @@ class Sensor:
 
 
 USUAL_SENSOR = Sensor(noise=0.05, delay=0.1, rate=20.0)
-PERFECT = Sensor()
+PERFECT_SENSOR = Sensor()
 
 
 def read_sensor(text: str) -> Sensor:
@@ -179,7 +179,7 @@ def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observe
         lengths = 0.5 * (track.size.length + other.size.length)
         same_way = np.cos(a.heading[mine] - b.heading[theirs]) > 0.5
         beside = b.lane_index[theirs] - a.lane_index[mine] == side
-        near = (a.road[mine] == b.road[theirs]) | (across < ACROSS)
+        near = (a.road[mine] == b.road[theirs]) | (across < CARRIAGEWAY_DISTANCE)
         better = same_way & beside & near & (ahead > -lengths) & (ahead < np.minimum(nearest[mine], WATCHED_DISTANCE))
         rows = np.flatnonzero(better)
         at = mine.start + rows

@@ -44,24 +44,22 @@ def detection_page(
     )
     page.figure(curves_figure(curves), "Cut-ins seen before the marking is crossed, and how long before")
     page.section("Worst cases")
-    case_rows = [_case_row(number, *case) for number, case in enumerate(worst, 1)]
+    case_rows = [
+        {
+            "case": Html(f'<a href="#case-{number}">{number}</a>'), "kind": case.kind, "source": source,
+            "detector": detector, "scene": case.scene.name, "vehicle": case.view.track.name,
+            "time [s]": f"{case.time:.1f}",
+        }
+        for number, (source, detector, case) in enumerate(worst, 1)
+    ]  # fmt: skip
     page.table(case_rows, "Cut-ins that were missed or seen late, then false alarms farthest above their threshold")
     for number, (_, detector, case) in enumerate(worst, 1):
         title = f"{number}: {case.kind}, {case.view.track.name} at {case.time:.1f} s"
         page.heading(title, anchor=f"case-{number}")
-        scene = clip_scene(case)
-        if scene is not None:
+        if (scene := clip_scene(case)) is not None:
             page.player(scene, f"Case {number} from above", anchor=f"scene-{number}")
         page.figure(_case_figure(case), f"Towards the neighbouring lane; shaded: alarm of {detector}")
     return page.html(provenance)
-
-
-def _case_row(number: int, source: str, detector: str, case: Case) -> dict[str, object]:
-    link = Html(f'<a href="#case-{number}">{number}</a>')
-    return {
-        "case": link, "kind": case.kind, "source": source, "detector": detector, "scene": case.scene.name,
-        "vehicle": case.view.track.name, "time [s]": f"{case.time:.1f}",
-    }  # fmt: skip
 
 
 def curves_figure(curves: Sequence[Curve]) -> Figure:

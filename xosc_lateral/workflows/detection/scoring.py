@@ -11,14 +11,14 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.workflows.detection.detectors import NO_DANGER, Detector
 from xosc_lateral.workflows.detection.observation import View
-from xosc_lateral.workflows.detection.tracks import MARGIN, STEP, LaneChange, Scene
+from xosc_lateral.workflows.detection.tracks import MARGIN_ROWS, STEP, LaneChange, Scene
 
 RESAMPLES = 500
 """Of the bootstrap: the ends of a 95 % interval lie then at the 12th value from either side."""
-INTERVAL = (0.025, 0.975)
+INTERVAL_SHARES = (0.025, 0.975)
 NO_ALARM_BOUND = 3.689
 """Upper end of the 95 % interval of a Poisson count of which none was seen: -ln(0.025)."""
-CASES = 5
+SHOWN_CASES = 5
 """Worst cases that are kept of each detector and source."""
 
 
@@ -42,7 +42,7 @@ def worst_of(cases: Sequence[tuple[str, str, Case]]) -> list[tuple[str, str, Cas
         vehicle = candidate[2].scene.name, candidate[2].view.track.name
         if all(vehicle != (case.scene.name, case.view.track.name) for *_, case in worst):
             worst.append(candidate)
-    return worst[:CASES]
+    return worst[:SHOWN_CASES]
 
 
 @dataclass(eq=False)
@@ -98,7 +98,7 @@ class Tally:
             self._add_case(Case("late", scene, view, time, 1e3 - lead, score, limit))
 
     def _add_case(self, case: Case) -> None:
-        self.cases = sorted([*self.cases, case], key=lambda each: -each.badness)[:CASES]
+        self.cases = sorted([*self.cases, case], key=lambda each: -each.badness)[:SHOWN_CASES]
 
     def curve(self) -> Curve:
         """What was counted, as arrays."""
@@ -128,9 +128,9 @@ def count_onsets(score: FloatArray, keeping: BoolArray, limits: FloatArray) -> I
 def lead_times(score: FloatArray, change: LaneChange, limits: FloatArray) -> FloatArray:
     """From the alarm to the crossing of the marking, for each limit, NaN: none until the lane is another. [s]
 
-    An alarm counts that stands when the lane change begins, from `MARGIN` before on, or comes later.
+    An alarm counts that stands when the lane change begins, from `MARGIN_ROWS` before on, or comes later.
     """
-    start = max(change.begin - MARGIN, 0)
+    start = max(change.begin - MARGIN_ROWS, 0)
     flags = score[start : change.centre + 1] > limits[:, None]
     begin = change.begin - start
     early, later = flags[:, :begin], flags[:, begin:]
@@ -185,7 +185,7 @@ class Curve:
         if len(self.hours) > 1:
             hours = self.weights @ self.hours
             drawn = (self.weights @ self.counts) / np.where(hours > 0.0, hours, np.nan)[:, None]
-            interval = np.nanquantile(drawn, INTERVAL, axis=0)
+            interval = np.nanquantile(drawn, INTERVAL_SHARES, axis=0)
         else:
             interval = np.full((2, self.counts.shape[1]), np.nan)
         none = self.counts.sum(axis=0) == 0
@@ -199,7 +199,7 @@ class Curve:
         drawn = self.weights[:, self.cluster].astype(np.float64)
         count = drawn.sum(axis=1)
         shares = (drawn @ (self.leads > (0.0 if in_time else -np.inf))) / np.where(count > 0.0, count, np.nan)[:, None]
-        return np.asarray(np.nanquantile(shares, INTERVAL, axis=0))
+        return np.asarray(np.nanquantile(shares, INTERVAL_SHARES, axis=0))
 
     def lead_interval(self) -> tuple[float, float]:
         """95 % interval of the median time before the marking at the threshold that is set. [s]"""
@@ -210,7 +210,7 @@ class Curve:
         medians = [_quantile(one[np.isfinite(one)], 0.5) for one in drawn]
         if not np.isfinite(medians).any():
             return np.nan, np.nan
-        low, high = np.nanquantile(medians, INTERVAL)
+        low, high = np.nanquantile(medians, INTERVAL_SHARES)
         return float(low), float(high)
 
     def sensitive_rate(self) -> FloatArray:

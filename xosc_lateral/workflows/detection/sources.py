@@ -12,8 +12,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.segment import MINIMUM_SPEED
-from xosc_lateral.drivers.drives.cuts import HALF_WIDTH
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
 from xosc_lateral.files.mapping import TableMapping, as_mapping
 from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind

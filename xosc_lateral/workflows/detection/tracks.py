@@ -119,10 +119,10 @@ def _even(name: str, cluster: str, size: Size, rows: Rows, part: slice) -> Track
 
 
 # ---- what truly happens ----
-MARGIN = round(DEFAULT_CUTS.margin / STEP)
+MARGIN_ROWS = round(DEFAULT_CUTS.margin / STEP)
 """No lane keeping is counted so near to a lane change, and an alarm so shortly before it has seen it: its beginning is
 known no better. [rows]"""
-EDGE = round(DEFAULT_CUTS.edge / STEP)
+EDGE_ROWS = round(DEFAULT_CUTS.edge / STEP)
 """Nor so near to the ends of a track, where a lane change may begin or end unseen. [rows]"""
 
 
@@ -152,11 +152,11 @@ def truth_of(track: Track) -> Truth:
     room = np.maximum(0.5 * (track.rows.lane_width - width), SETTLED_OFFSET)
     course = Course(time, track.lateral, track.base, track.level, lateral_speed(time, track.lateral), room)
     keeping = track.rows.following.copy()
-    keeping[:EDGE], keeping[max(n - EDGE, 0) :] = False, False
+    keeping[:EDGE_ROWS], keeping[max(n - EDGE_ROWS, 0) :] = False, False
     changes = []
     for rough in course.maneuvers():
-        keeping[max(rough.first - MARGIN, 0) : rough.last + MARGIN + 1] = False
-        if rough.lanes and not rough.cut and not rough.aborted and rough.first >= EDGE:
+        keeping[max(rough.first - MARGIN_ROWS, 0) : rough.last + MARGIN_ROWS + 1] = False
+        if rough.lanes and not rough.cut and not rough.aborted and rough.first >= EDGE_ROWS:
             changes.append(_lane_change(track, rough.first, rough.last, 1 if rough.lanes > 0 else -1))
     return Truth(tuple(changes), keeping)
 

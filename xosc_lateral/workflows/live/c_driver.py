@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from textwrap import wrap
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import CONTEXT_UNITS
@@ -22,18 +23,10 @@ def identifier(profile: DriverProfile) -> str:
 
 
 def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False) -> list[Path]:
-    """Write a driver as C99: header, source, the profile's numbers, a CMake file and an example loop.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    folder : path
-        Made where there is none.
-    force : bool
-        Replace files of the same names.
+    """Write a driver as C99 into a folder: header, source, the profile's numbers, a CMake file and an example loop.
 
     Raises `DriverProfileError` if the profile has an effect or a core model of a plug-in; `FormatError` if a file is
-    there.
+    there that is not to be replaced (`force`).
     """
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [output_folder(folder) / name for name in texts]
@@ -61,13 +54,16 @@ def _fields(profile: DriverProfile) -> dict[str, str]:
 def c_sources(profile: DriverProfile) -> dict[str, str]:
     """Header, source and numbers of a driver, by file name."""
     name, fields = identifier(profile), _fields(profile)
-    sizes, numbers = numbers_of(profile)
+    (sizes, numbers), what = numbers_of(profile), _about(profile)
     words = {
-        "WHAT": f"Driver {re.sub(r'[^ -.0-~]', '_', profile.name)} of xosc-lateral {__version__}, in C99.",
+        "WHAT": what,
         "SIZES": "\n".join(f"#define DRIVER_{key} {value}" for key, value in sizes.items()),
         "MEMORY": str(_memory(sizes)),
         "PREVIEW": repr(round(sizes["LOOKS"] * profile.model.step, 9)),
-        "INPUTS": "\n".join(_input(column, field) for column, field in fields.items()),
+        "INPUTS": "\n".join(
+            f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
+            for column, field in fields.items()
+        ),
         "KNOWN": "\n".join(
             f"#define DRIVER_KNOWS_{field} UINT64_C({1 << k})" for k, field in enumerate(fields.values())
         ),
@@ -76,8 +72,18 @@ def c_sources(profile: DriverProfile) -> dict[str, str]:
     return {
         f"{name}.h": filled("driver.h", profile, words),
         f"{name}.c": filled("driver.c", profile),
-        f"{name}_profile.h": _named("\n".join(numbers) + "\n", profile),
+        f"{name}_profile.h": _named("\n".join([f"/* {what}\n */", *numbers, ""]), profile),
     }
+
+
+def _about(profile: DriverProfile) -> str:
+    """The driver's name, and the licences that its profile states, as lines of a comment."""
+    licences = {"profile": profile.metadata.licence, "drives that it was fitted to": profile.provenance.licence}
+    lines = [f"Driver {profile.name} of xosc-lateral {__version__}, in C99."]
+    for what, licence in licences.items():
+        lines += wrap(f"Licence of the {what}: {licence}", 115) if licence else []
+    text = re.sub(r"[^ -~\n]", "_", "\n * ".join(lines))
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", text)  # no end of a comment, and no beginning of another
 
 
 def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
@@ -90,10 +96,6 @@ def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | Non
 
 def _named(text: str, profile: DriverProfile) -> str:
     return re.sub(r"\bDRIVER(?=_|\.h|\b)", identifier(profile), text)
-
-
-def _input(column: str, field: str) -> str:
-    return f"    double {field}; /* [{CONTEXT_UNITS.get(column, 'as in the profile')}] */"
 
 
 def _memory(sizes: Mapping[str, int]) -> int:

@@ -16,9 +16,14 @@ from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, phases
-from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import CANDIDATES, SLOW_CORRELATION_TIME
+from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
+    CANDIDATES,
+    COARSE_EVERY,
+    SLOW_CORRELATION_TIME,
+    TICKS,
+    phases,
+)
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
 from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
@@ -29,7 +34,7 @@ from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoL
 from xosc_lateral.workflows.live import paths
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME
 
-USUAL = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
+USUAL_INPUTS = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
 """Inputs that nobody sets; others are 0, of distances that nobody is there."""
 
 SHAPES = ("VALUE", "MAGNITUDE", "BEYOND", "SATURATING", "STEP_AT", "HINGE_AT", "EQUALS", "PRESENCE", "NEARNESS",
@@ -61,7 +66,7 @@ def usual(profile: DriverProfile, column: str) -> float:
     """Value of an input that nobody sets."""
     if column.endswith("_distance"):
         return np.inf
-    return {**USUAL, "lane_width": profile.lane_width}.get(column, 0.0)
+    return {**USUAL_INPUTS, "lane_width": profile.lane_width}.get(column, 0.0)
 
 
 # ---- the profile's numbers -------------------------------------------------------------------------------------------
@@ -70,7 +75,13 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
     columned = [effect for effect in profile.effects if isinstance(effect, kinds.ColumnEffect)]
     hidden = [effect for effect in profile.effects if isinstance(effect, kinds.HiddenEffect)]
     sizes, lines = _effects(profile, columned)
-    core_sizes, core = _core(profile)
+    match profile.model:
+        case TwoLevelModel():
+            core_sizes, core = _two_level(profile.model)
+        case AutoregressiveModel():
+            core_sizes, core = _autoregressive(profile.model)
+        case _:
+            raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {profile.model.kind!r}")
     hidden_lines = _hidden(profile, hidden)
     rated = any(effect.acts is kinds.Acts.RATE for effect in columned) or any(
         isinstance(effect, kinds.Adapted) and effect.rate != 1.0 for effect in hidden
@@ -85,8 +96,8 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "OWN_LANE_WIDTH": profile.lane_width, "WIDEST_LANE": np.inf if measured is None else measured[1],
         "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
         "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
-        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER * paths.TURN, "STEP_PEAK": paths.STEP_PEAK,
-        "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER_SHARE * paths.LARGEST_TURN_RATE,
+        "STEP_PEAK": paths.STEP_PEAK, "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
@@ -147,15 +158,6 @@ def _array(name: str, values: Iterable[Any], kind: str = "double") -> str:
 
 
 # ---- core models -----------------------------------------------------------------------------------------------------
-def _core(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
-    model = profile.model
-    if isinstance(model, TwoLevelModel):
-        return _two_level(model)
-    if isinstance(model, AutoregressiveModel):
-        return _autoregressive(model)
-    raise DriverProfileError(f"profile {profile.name}: the C driver has no core model {model.kind!r}")
-
-
 def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[str]]:
     table, order, half = phases(), model.coarse.order, len(model.kernel) // 2
     first = max(half, COARSE_EVERY * TICKS)
@@ -167,7 +169,7 @@ def _autoregressive(model: AutoregressiveModel) -> tuple[dict[str, int], list[st
     variance = {"quick": [part.within for part in parts], "slow": [part.slow for part in parts]}
     between = np.array([part.between for part in parts])
     constants = {
-        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE,
+        "DRIVER_MEAN": model.mean, "DRIVER_BETWEEN": model.between_drivers, "DRIVER_ORDER": order, "KNEE": KNEE_SHARE,
         "HEADROOM": HEADROOM, "CANDIDATES": CANDIDATES, "CORRELATION": model.correlation,
         "OTHER_SHARE": np.sqrt(1.0 - model.correlation**2), "VARIES_SLOWLY": int(any(variance["slow"])),
         "COARSE_NOISE": model.coarse.scale, "PHASE_STEPS": len(table),
@@ -219,7 +221,9 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
     if type(effect) not in kinds.EFFECTS:
         raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     if isinstance(effect, kinds.Product):
-        return [tuple(_factor(factor) for factor in effect.factors)]
+        angles = (kinds.Form.SINE, kinds.Form.COSINE)
+        at = [2.0 * np.pi / factor.at if factor.form in angles else factor.at for factor in effect.factors]
+        return [tuple((factor.form.name, factor.column, k, 0.0) for factor, k in zip(effect.factors, at, strict=True))]
     column = effect.columns[0]
     match effect:
         case kinds.Linear():
@@ -243,11 +247,6 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
         case _:
             raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
     return [((name, column, first, second),) for name, first, second in shapes]
-
-
-def _factor(factor: kinds.Factor) -> Shape:
-    at = 2.0 * np.pi / factor.at if factor.form in (kinds.Form.SINE, kinds.Form.COSINE) else factor.at
-    return factor.form.name, factor.column, at, 0.0
 
 
 def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> tuple[dict[str, int], list[str]]:
@@ -344,7 +343,7 @@ def _hidden_numbers(effect: kinds.HiddenEffect, step: float) -> tuple[str, list[
 
 
 # ---- numpy's normal and exponential numbers --------------------------------------------------------------------------
-LAYERS = 256
+ZIGGURAT_LAYERS = 256
 
 
 @cache
@@ -372,7 +371,7 @@ def ziggurats() -> tuple[str, ...]:
 def _ziggurat(name: str, tail: Decimal, beyond: Decimal, bits: int, density: Any, inverse: Any) -> list[str]:
     """Of a density whose tail has `beyond` times its height as area."""
     area, borders = density(tail) * (tail + beyond), [tail]
-    while len(borders) < LAYERS - 1:
+    while len(borders) < ZIGGURAT_LAYERS - 1:
         borders.insert(0, inverse(area / borders[0] + density(borders[0])))
     widths, scale = [area / density(tail), *borders], Decimal(2) ** bits
     inside = [tail / widths[0] * scale, 0, *(low / high * scale for low, high in pairwise(borders))]

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.live.scene import Scene
     from xosc_lateral.world.scenario.entity import Entity
 
-STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
+STATE_COLUMNS = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
 
-EXTERNAL = (1, 11)
+EXTERNAL_CONTROLLERS = (1, 11)
 """Controllers of esmini that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
-ROW = (*STATES, "z", "pitch", "roll")
+TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")
 """The same with what only a trace has."""
 
 
@@ -51,16 +51,8 @@ def live_esmini(
 ) -> LiveRun:  # fmt: skip
     """Play a scenario in esmini with drivers in its vehicles.
 
-    Parameters
-    ----------
-    scenario : path
-    library : path, ctypes.CDLL, or object with the same functions
-        ``libesminiLib.so``, ``esminiLib.dll``: the user's own.
-
-    Raises
-    ------
-    SimulationError, FormatError
-        In one line.
+    The `library` is the user's own: its path, a `ctypes.CDLL`, or an object with the same functions. Raises
+    `SimulationError` or `FormatError` in one line.
     """
     from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
@@ -92,7 +84,7 @@ def live_esmini(
                 place = (state.road, state.lane, state.s, traffic.offset_of(state))
                 pose = (state.x, state.y, state.h, state.speed)
                 rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
-                if state.ctrl_type in EXTERNAL:
+                if state.ctrl_type in EXTERNAL_CONTROLLERS:
                     waiting.setdefault(name, set()).add(pose[:2])
             if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
                 break
@@ -106,7 +98,7 @@ def live_esmini(
     scene = Scene(traffic.entities, lambda: traffic.network, ego)
     stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
              "with EsminiTraffic" for name, places in waiting.items() if len(places) == 1]  # fmt: skip
-    return LiveRun(rows, settings, [*traffic.warnings, *stood], events, scene)
+    return LiveRun(rows, settings, [*traffic.warnings, *stood], scene, events)
 
 
 @declare_options
@@ -126,17 +118,8 @@ def live_sumo(
 ) -> LiveRun:  # fmt: skip
     """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
 
-    Parameters
-    ----------
-    config : path
-        ``.sumocfg``; SUMO's own random seed is as it says.
-    options : sequence of str
-        Further words of SUMO's command line.
-
-    Raises
-    ------
-    SimulationError
-        In one line.
+    SUMO's own random seed is as `config` (``.sumocfg``) says; `options` are further words of its command line. Raises
+    `SimulationError` in one line.
     """
     from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.scene import Scene, sumo_entity, sumo_network
@@ -182,7 +165,7 @@ def live_sumo(
     warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
                 if count]  # fmt: skip
     scene = Scene(tuple(entities.values()), partial(sumo_network, net), ego, is_road=False)
-    return LiveRun(rows, settings, [*traffic.warnings, *warnings], scene=scene)
+    return LiveRun(rows, settings, [*traffic.warnings, *warnings], scene)
 
 
 class LiveRun(Result):
@@ -195,10 +178,10 @@ class LiveRun(Result):
         rows: Sequence[tuple[Any, ...]],
         settings: Mapping[str, Any],
         warnings: Sequence[str],
+        scene: Scene,
         events: Sequence[tuple[float, str, int]] = (),
-        scene: Scene | None = None,
     ) -> None:
-        self._rows = pd.DataFrame(rows, columns=list(ROW))
+        self._rows = pd.DataFrame(rows, columns=list(TRACE_COLUMNS))
         self._settings, self._scene = dict(settings), scene
         self.warnings = tuple(warnings)
         """What a user has to know, a line each."""
@@ -217,8 +200,8 @@ class LiveRun(Result):
         return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
-        return self._rows[list(STATES)]
+        """One row per vehicle and step, see `STATE_COLUMNS`; SI units, offsets positive left of travel."""
+        return self._rows[list(STATE_COLUMNS)]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""
@@ -236,17 +219,12 @@ class LiveRun(Result):
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step.
 
-        Raises
-        ------
-        SimulationError
-            If the run says nothing of its vehicles, or SUMO's network can't be made a road.
+        Raises `SimulationError` if SUMO's network can't be made a road.
         """
         from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.files.osi.write import host_of, write_osi
         from xosc_lateral.workflows.live.scene import motion_of
 
-        if self._scene is None:
-            raise SimulationError("the run says nothing of its vehicles and its road: there is no trace of it")
         output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
         claim([output], force=force)
         network = self._scene.network()

@@ -19,11 +19,11 @@ from xosc_lateral.base.arrays import IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
-from xosc_lateral.workflows.live.paths import LEADING_OVER, TURN, Moves
+from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
@@ -37,45 +37,38 @@ from xosc_lateral.world.scenario.private_actions import (
 from xosc_lateral.world.scenario.scenario import Scenario
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
-LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
+LATERAL_ACTIONS = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""
 
 _INIT_NAMES = {TeleportAction: "TeleportAction", FollowTrajectoryAction: "RoutingAction"}
 """What esmini calls actions of Init, apart from ``LateralAction``."""
 
-_ACTION, _RUNNING = 7, 2
+_ACTION_TYPE, _RUNNING_STATE = 7, 2
 """Kind and state of a storyboard element (`StoryBoardElement::ElementType` and `State`)."""
 
-_VEHICLE, _TRUCKS, _PULLED = 1, (2, 3, 4, 5), (3, 4)
+_VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 """`Object::Type`; `Vehicle::Category` of trucks, trailers and buses, and of what has no driver of its own."""
 
 
 class _Lane(NamedTuple):
-    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 where +t is to the left of
-    where the vehicle drives (else -1), width [m], heading of travel [rad]."""
+    """Where a vehicle is."""
 
-    place: tuple[int, int]
+    place: tuple[int, int]  # Road and lane.
     is_lane: bool
     is_driving: bool
-    direction: float
-    width: float
-    heading: float
+    direction: float  # +1 where +t is to the left of where the vehicle drives, else -1.
+    width: float  # [m]
+    heading: float  # Of travel. [rad]
 
 
 @dataclass(slots=True)
 class _Rest:
-    """Lateral speed at a maneuver's start [m/s] that runs out over a time [s]; way beside the maneuver so far [m]."""
+    """What is left of the lateral speed at a maneuver's start."""
 
-    rate: float
-    over: float
-    passed: float = 0.0
-    way: float = 0.0
-
-    def on(self, dt: float) -> float:
-        """So much later [s]: the way. [m]"""
-        self.passed += dt
-        self.way = float(settle(np.array([self.passed]), self.over, self.rate, 0.0)[0])
-        return self.way
+    rate: float  # At its start. [m/s]
+    over: float  # It runs out over so long. [s]
+    passed: float = 0.0  # [s]
+    way: float = 0.0  # Beside the maneuver so far. [m]
 
 
 LANE_STEP = 0.5
@@ -89,26 +82,10 @@ class EsminiTraffic:
     """Drivers of the vehicles of a scenario that esmini has opened.
 
     Call `steer` before every ``SE_StepDT``, and `settle` after it; all else stays with the caller: opening, stepping,
-    an external ego.
-
-    Parameters
-    ----------
-    library : path, ctypes.CDLL, or object with the same functions
-        In which ``SE_Init`` was called.
-    scenario : path
-        The one that it plays: it says which actions are lateral, and whose.
-    profile : DriverProfile
-    ego : str or collection of str
-        Vehicles under test: nobody of ours drives them, and they are seen where they are.
-    seed, profiles, neighbours
-        See `Traffic`.
-    on_element : callable, optional
-        Is called with the arguments of esmini's storyboard callback, of which there is one.
-
-    Attributes
-    ----------
-    warnings : list of str
-        What a user has to know, a line each.
+    an external ego. The `library` is its path, a `ctypes.CDLL` or an object with the same functions, in which
+    ``SE_Init`` was called for the `scenario`, which says which actions are lateral, and whose. Nobody of ours drives
+    the `ego`, one or several; they are seen where they are. `on_element` is called as esmini's storyboard callback, of
+    which there is one. For `seed`, `profiles` and `neighbours` see `Traffic`.
     """
 
     def __init__(
@@ -138,6 +115,7 @@ class EsminiTraffic:
         self._lane_of: dict[str, _Lane] = {}
         self._also = on_element
         self.warnings: list[str] = []
+        """What a user has to know, a line each."""
         path = (self.player.SE_GetODRFilename() or b"").decode()
         try:
             self.network = read_opendrive(path)
@@ -190,14 +168,16 @@ class EsminiTraffic:
             if name in busy and steered:  # begun in this step, in which the driver's place still counts
                 if abs(self.offset_of(state) - offset) > _SAME_PLACE:
                     continue
-                bound = LEADING_OVER * TURN * max(abs(state.speed), MINIMUM_SPEED)
+                bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * max(abs(state.speed), MINIMUM_SPEED)
                 over = max(SETTLING_TIME, 4.0 * abs(self._rates[name]) / bound)
                 self._rests[name] = _Rest(self._rates[name], over)
             elif self._road(state) < 0 or (name not in busy and name not in self._touched):
                 self._rests.pop(name, None)
             elif name in self._rests:  # once more when the action is over: from there on the driver leads over
-                way = self._rests[name].on(dt)
-                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * way)
+                rest = self._rests[name]
+                rest.passed += dt
+                rest.way = float(settle(np.array([rest.passed]), rest.over, rest.rate, 0.0)[0])
+                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * rest.way)
 
     def _busy(self) -> set[str]:
         """Whom a lateral action moves now."""
@@ -232,17 +212,13 @@ class EsminiTraffic:
 
     def _is_sound(self, name: str, state: ObjectState) -> bool:
         """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
-        if state.type != _VEHICLE:
+        if state.type != _VEHICLE_TYPE:
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
         bad = [what for what, value in numbers.items() if not np.isfinite(value)]
-        if bad:
-            self._say(f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone")
-        return not bad
-
-    def _say(self, line: str) -> None:
-        if line not in self.warnings:
+        if bad and (line := f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone") not in self.warnings:
             self.warnings.append(line)
+        return not bad
 
     def _road(self, state: ObjectState) -> int:
         return self._roads.get(str(state.road), -1)
@@ -261,7 +237,7 @@ class EsminiTraffic:
         heading = np.array([one.heading for one in lanes])
         is_lane = np.array([one.is_driving for one in lanes], dtype=np.bool_)
         width = np.array([one.width for one in lanes])
-        pulled = np.array([state.category in _PULLED for _, state in seen], dtype=np.bool_)
+        pulled = np.array([state.category in _PULLED_CATEGORIES for _, state in seen], dtype=np.bool_)
         others = self._ego | self._steered
         ours = np.array([state.ctrl_type == 0 and name not in others for name, state in seen], dtype=np.bool_)
         busy = self._busy()
@@ -276,7 +252,7 @@ class EsminiTraffic:
         self._touched.clear()
         return Moment(
             names, column["speed"], width, offset, is_lane & ~in_maneuver, ours & ~pulled,
-            np.array([state.category in _TRUCKS for _, state in seen], dtype=np.bool_),
+            np.array([state.category in _TRUCK_CATEGORIES for _, state in seen], dtype=np.bool_),
             base=np.array([self._base[name] for name in names]),
             places=Places(column["x"], column["y"], heading, road, lane, column["s"], column["length"],
                           column["width"], column["center_x"]),
@@ -288,16 +264,13 @@ class EsminiTraffic:
         for (name, state), index in zip(seen, road.tolist(), strict=True):
             known = self._lane_of.get(name)
             if known is None or anew or known.place != (index, state.lane):
-                place, s = (index, state.lane), state.s
-                known = _Lane(place, False, False, 1.0, 1.0, state.h)
-                turned = network.header_offset.heading  # x and y are inertial
-                if index >= 0 and state.lane != 0 and network.has_lane_at(index, state.lane, s):
-                    width = float(network.lane_width(index, state.lane, s))
-                    known = _Lane(
-                        place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
-                        self._direction(state), max(width, 1e-3),
-                        network.pose_at(index, state.lane, s).heading + turned,
-                    )  # fmt: skip
+                where = (index, state.lane, state.s)
+                known = _Lane(where[:2], False, False, 1.0, 1.0, state.h)
+                if index >= 0 and state.lane != 0 and network.has_lane_at(*where):
+                    width, heading = float(network.lane_width(*where)), network.pose_at(*where).heading
+                    is_driving = bool(network.lane_index(*where)[0] >= 0) and width > 0.0
+                    heading += network.header_offset.heading  # x and y are inertial
+                    known = _Lane(where[:2], True, is_driving, self._direction(state), max(width, 1e-3), heading)
                 self._lane_of[name] = known
             lanes.append(known)
         return lanes
@@ -305,8 +278,8 @@ class EsminiTraffic:
     def _on_element(self, name: bytes, kind: int, state: int, path: bytes) -> None:
         """Esmini's callback: a lateral action takes its vehicles, and gives them back."""
         key = path.decode(errors="replace")
-        if kind == _ACTION and key in self._moved_by:
-            self._running[key] = max(self._running[key] + (1 if state == _RUNNING else -1), 0)
+        if kind == _ACTION_TYPE and key in self._moved_by:
+            self._running[key] = max(self._running[key] + (1 if state == _RUNNING_STATE else -1), 0)
             self._touched |= self._moved_by[key]
         if self._also is not None:
             self._also(name, kind, state, path)
@@ -318,7 +291,7 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
     moved_by: defaultdict[str, set[str]] = defaultdict(set)
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
-            if isinstance(action.content, LATERAL):
+            if isinstance(action.content, LATERAL_ACTIONS):
                 word = _INIT_NAMES.get(type(action.content), "LateralAction")
                 moved_by[f"Init {private.entity_ref} {word}"].add(private.entity_ref)
     groups = ((story, act, group) for story in scenario.storyboard.stories for act in story.acts
@@ -328,7 +301,7 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
         for maneuver in group.maneuvers:
             for event in maneuver.events:
                 for action in event.actions:
-                    if isinstance(action.content, LATERAL):
+                    if isinstance(action.content, LATERAL_ACTIONS):
                         parts = (story, act, group, maneuver, event, action)
                         moved_by["::".join(part.name for part in parts)] |= actors
     return dict(moved_by)

@@ -79,12 +79,16 @@ class Player:
     def _compare(self, number: int) -> None:
         """Refuse another structure than ours: longer, shorter, or with something else first."""
         size, spare = c.sizeof(ObjectState), 256
-        buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED] * (size + spare)))
+        buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED_BYTE] * (size + spare)))
         if self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
             return
         end = ObjectState.visibility
         last, beyond = bytes(buffer[end.offset : end.offset + end.size]), bytes(buffer[size:])
-        if last.count(_UNTOUCHED) == len(last) or beyond.count(_UNTOUCHED) < spare or buffer[0] != number & 0xFF:
+        if (
+            last.count(_UNTOUCHED_BYTE) == len(last)
+            or beyond.count(_UNTOUCHED_BYTE) < spare
+            or buffer[0] != number & 0xFF
+        ):
             raise SimulationError(
                 f"{self.where}: another SE_ScenarioObjectState than the {size} bytes of esmini 3; a library of that "
                 "version is needed"
@@ -92,7 +96,7 @@ class Player:
         self._is_known = True
 
 
-_UNTOUCHED = 0xA5
+_UNTOUCHED_BYTE = 0xA5
 """A byte that nobody writes by chance at every place."""
 
 

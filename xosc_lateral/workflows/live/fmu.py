@@ -21,8 +21,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.workflows.live.c_driver import c_sources, filled, identifier
 from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, Variable, add_units, variables_of
-from xosc_lateral.workflows.live.python_fmu import export_python_fmu
+from xosc_lateral.workflows.live.python_fmu import ABSENT_DISTANCE, Variable, add_units, export_python_fmu, variables_of
 
 HOST_COMPILERS = ("cc", "gcc", "clang")
 """What is looked for where no compiler is named; the first that is there."""
@@ -30,27 +29,17 @@ HOST_COMPILERS = ("cc", "gcc", "clang")
 COMPILER_TIMEOUT = 120.0
 """A driver compiles in a second. [s]"""
 
-STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "DeserializeFMUState")}
+NAMES_OF_STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "DeserializeFMUState")}
 """What versions of FMI call the state, and reading it back."""
 
 
 def export_fmu(
     profile: DriverProfile, path: str | Path, *, fmi: str = "2.0", python: bool = False, compilers: Sequence[str] = ()
 ) -> tuple[str, ...]:
-    """Write a unit; the platforms that it has binaries for.
+    """Write a unit (``.fmu``, which is replaced) of FMI ``2.0`` or ``3.0``; the platforms that it has binaries for.
 
-    Parameters
-    ----------
-    profile : DriverProfile
-    path : path
-        ``.fmu``, which is replaced.
-    fmi : str
-        ``2.0`` or ``3.0``.
-    python : bool
-        A unit that calls this package, which the simulating process has to have beside its Python (extra `fmu`).
-    compilers : sequence of str
-        Of C99, cross compilers too; without, the host's where there is one. C source is in every unit.
-
+    It holds C source, and what the C99 `compilers` make of it, cross compilers too; without, the host's where there is
+    one. A `python` unit calls this package, which the simulating process has to have beside its Python (extra `fmu`).
     Raises `SimulationError`: a compiler is not there or fails, or the extra `fmu` is missing; `DriverProfileError`: the
     profile has an effect or a core model of a plug-in.
     """
@@ -74,7 +63,7 @@ def export_fmu(
 
 def _sources(profile: DriverProfile, version: str) -> dict[str, str]:
     sources = c_sources(profile)
-    state, deserialize = STATE[version]
+    state, deserialize = NAMES_OF_STATE[version]
     distances = [
         0 if not column.endswith("_distance") else 1 if column in DISTANCES else 2 for column in inputs_of(profile)
     ]
@@ -135,7 +124,7 @@ def _platform(machine: str, version: str) -> tuple[str, str]:
 
 def _description(profile: DriverProfile, version: str, token: str) -> Element:
     """The model description."""
-    is_2, name, state = version == "2", identifier(profile), STATE[version][0]
+    is_2, name, state = version == "2", identifier(profile), NAMES_OF_STATE[version][0]
     root = Element("fmiModelDescription", {
         "fmiVersion": f"{version}.0", "modelName": name, "guid" if is_2 else "instantiationToken": token,
         "description": f"Driver {profile.name} of xosc-lateral {__version__}: lateral offset in the lane, positive "
@@ -171,11 +160,6 @@ def _description(profile: DriverProfile, version: str, token: str) -> Element:
     return root
 
 
-def _list_sources(place: Element, element: str, name: str) -> None:
-    for file in (f"{name}.c", "fmi.c"):
-        SubElement(place, element, name=file)
-
-
 def _value(variable: Variable) -> dict[str, str]:
     """Unit and start."""
     words = {} if variable.unit is None else {"unit": variable.unit}
@@ -191,6 +175,11 @@ def _build_description(name: str) -> Element:
     words = {"optional": "true", "description": "For shared libraries: functions without a prefix"}
     SubElement(files, "PreprocessorDefinition", words, name="FMI3_OVERRIDE_FUNCTION_PREFIX")
     return root
+
+
+def _list_sources(place: Element, element: str, name: str) -> None:
+    for file in (f"{name}.c", "fmi.c"):
+        SubElement(place, element, name=file)
 
 
 def _xml(root: Element) -> bytes:

@@ -1,7 +1,7 @@
 """From a driver's curve to where his vehicle is: what leads over to his path, slow driving, moving aside.
 
-A vehicle's path has no corner (`TURN`): where a maneuver has moved it, its path leads over from there to the driver's;
-below 40 km/h there is less of the driver's movement.
+A vehicle's path has no corner (`LARGEST_TURN_RATE`): where a maneuver has moved it, its path leads over from there to
+the driver's; below 40 km/h there is less of the driver's movement.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle, smoother_step
 from xosc_lateral.world.surroundings.around import smooth_step
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
-TURN = 0.03
+LARGEST_TURN_RATE = 0.03
 """Change of heading per time that nobody takes for a corner of the path: 0.3 mrad in a step of 0.01 s. [rad/s]"""
 
-LEADING_OVER = 0.5
-"""Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
+LEADING_OVER_SHARE = 0.5
+"""Part of `LARGEST_TURN_RATE` that leading over to the path may take; the driver's own movement has the rest. [-]"""
 
 STEP_PEAK = 10.0 / np.sqrt(3.0)
 """Largest second derivative of the smooth step from 0 to 1 in unit time (of 10 u^3 - 15 u^4 + 6 u^5, by hand). [-]"""
@@ -30,7 +30,7 @@ STEP_PEAK = 10.0 / np.sqrt(3.0)
 STANDSTILL = 0.1
 """Below this speed a path has no direction. [m/s]"""
 
-SPEEDS = 6
+SPEEDS_REMEMBERED = 6
 """Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
 
 NEGLIGIBLE_REST = 1e-12
@@ -39,7 +39,7 @@ NEGLIGIBLE_REST = 1e-12
 DRIVER = np.dtype(
     [("curve", float, 6), ("begun", bool), ("following", bool), ("place", float), ("own", float),
      ("rest", float), ("from", float), ("from_rate", float), ("share", float), ("over", float), ("slip", float),
-     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS), ("width", float)]
+     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED), ("width", float)]
 )  # fmt: skip
 """A driver beside his random numbers.
 
@@ -127,17 +127,17 @@ def _pace(speed: FloatArray) -> FloatArray:
 
 
 def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
-    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING`."""
-    keep = np.exp(-passed / STEERING)
+    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING_DURATION`."""
+    keep = np.exp(-passed / STEERING_DURATION)
     gap = state["aside"] - state["wanted"]
-    drift = state["aside_rate"] + gap / STEERING
+    drift = state["aside_rate"] + gap / STEERING_DURATION
     state["aside"] = state["wanted"] + (gap + drift * passed) * keep
-    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING) * keep
+    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING_DURATION) * keep
 
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
     """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no corner at this speed. [m/s]"""
-    bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
+    bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * np.maximum(np.abs(speed), MINIMUM_SPEED)
     over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(STEP_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])

@@ -9,24 +9,25 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
-from xml.etree.ElementTree import SubElement
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.profiles import profile_hash, read_profile, write_profile
-from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.fmu_variables import ABSENT_DISTANCE, UNITS, Variable, add_units, variables_of
+from xosc_lateral.workflows.live.c_numbers import inputs_of, usual
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 
-NEEDS = (
+HOST_REQUIREMENT = (
     f"Needs a host with Python {sys.version_info.major}.{sys.version_info.minor} in its process, and xosc-lateral in "
     "that; others can't load it (undefined symbol: _Py_NoneStruct)"
 )
@@ -105,6 +106,7 @@ class Unit:
 
     package: ClassVar[str]
     fmi: ClassVar[str]
+    registers_units: ClassVar[bool]
     kinds: ClassVar[tuple[str, str, str]]
     """What the package calls real numbers, truth values and whole numbers."""
 
@@ -119,13 +121,14 @@ class Unit:
         self._variables = variables_of(self._own)
         self._columns = inputs_of(self._own)
         self.description = f"Driver {self._own.name} of xosc-lateral {__version__}: lateral offset in the lane, "
-        self.description += f"positive left. {NEEDS}"
+        self.description += f"positive left. {HOST_REQUIREMENT}"
         self.author, self.profile = "xosc-lateral", ""
         self._traffic: _OneDriver | None = None
         self._has_begun = False
         for variable in self._variables:
             setattr(self, variable.name, 0.0 if variable.start is None else variable.start)
-            words = {"description": variable.words, **self._unit(variable)}
+            words = {"description": variable.words}
+            words |= {"unit": variable.unit} if self.registers_units and variable.unit is not None else {}
             self._add(self.kinds[variable.kind], variable.name, variable.causality, variable.variability, **words)
         which = "Path or name of another profile; empty: the one within."
         self._add("String", "profile", "parameter", "fixed", description=which)
@@ -141,10 +144,6 @@ class Unit:
         made = getattr(package, kind)
         settings = {"causality": causalities[causality], "variability": variabilities[variability], **words}
         self.register_variable(made(name, **settings))  # type: ignore[attr-defined]
-
-    def _unit(self, variable: Variable) -> dict[str, str]:
-        """How a variable's unit is told."""
-        return {}
 
     def exit_initialization_mode(self) -> None:
         """The driver is drawn."""
@@ -211,7 +210,7 @@ class Unit:
 class Unit2(Unit):
     """FMI 2.0, with units and initial unknowns, which pythonfmu leaves out of the description."""
 
-    package, fmi = "pythonfmu", "2"
+    package, fmi, registers_units = "pythonfmu", "2", False
     kinds: ClassVar[tuple[str, str, str]] = ("Real", "Boolean", "Integer")
 
     def to_xml(self, *words: Any, **options: Any) -> Any:
@@ -240,20 +239,88 @@ class Unit2(Unit):
 class Unit3(Unit):
     """FMI 3.0, whose clock is a variable."""
 
-    package, fmi = "pythonfmu3", "3"
+    package, fmi, registers_units = "pythonfmu3", "3", True
     kinds: ClassVar[tuple[str, str, str]] = ("Float64", "Boolean", "Int32")
 
     def _add_more(self) -> None:
         unit = import_module("pythonfmu3").Unit
-        self.register_units([unit(name, **base) for name, base in UNITS.items()])  # type: ignore[attr-defined]
+        self.register_units([unit(name, **base) for name, base in BASE_UNITS.items()])  # type: ignore[attr-defined]
         self.time = 0.0
         self._add("Float64", "time", "independent", "continuous")
-
-    def _unit(self, variable: Variable) -> dict[str, str]:
-        return {} if variable.unit is None else {"unit": variable.unit}
 
     def _answer(self, fault: str | None = None) -> Any:
         package = import_module("pythonfmu3")
         if fault is not None:
             self.log(fault, package.Fmi3Status.error)  # type: ignore[attr-defined]
         return package.Fmi3StepResult(status=package.Fmi3Status.ok if fault is None else package.Fmi3Status.error)
+
+
+# ---- variables and units, of a unit in C and of one in Python alike --------------------------------------------------
+ABSENT_DISTANCE = 1000.0
+"""Distances from here on mean that nobody is there: files of FMI have no infinity that every tool reads. [m]"""
+
+BASE_UNITS: dict[str, dict[str, float]] = {
+    "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "1/m": {"m": -1}, "rad": {"rad": 1},
+    "%": {"factor": 0.01}, "h": {"s": 1, "factor": 3600.0}, "mm/h": {"m": 1, "s": -1, "factor": 1e-3 / 3600.0},
+    "deg": {"rad": 1, "factor": float(np.pi / 180.0)}, "lx": {"cd": 1, "m": -2}, "-": {},
+}  # fmt: skip
+"""Units of inputs and outputs in base units."""
+
+DESCRIPTIONS_OF_VARIABLES = {
+    "offset": "From the lane's centre, positive left", "rate": "Change of the offset per time",
+    "heading": "Relative to the lane, positive left", "position": "Where the vehicle is while it does not follow",
+    "following": "It follows the road; while not, `position` is where it is.",
+    "seed": "Same seed, same driver: as of `sample`.",
+    "lane_index": "0: rightmost", "curvature": "Positive: to the left",
+    **{
+        f"{side}_distance": f"Free space; {ABSENT_DISTANCE:g} or more: nobody"
+        for side in ("lead", "left", "right", "oncoming")
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable; those with a unit are real numbers."""
+
+    name: str
+    causality: str
+    start: float | bool | None
+    unit: str | None = None
+
+    @property
+    def kind(self) -> int:
+        """0: real, 1: truth value, 2: whole number."""
+        return 0 if self.unit is not None else 1 if isinstance(self.start, bool) else 2
+
+    @property
+    def variability(self) -> str:
+        """In the words of FMI."""
+        return ("continuous", "discrete", "fixed")[self.kind]
+
+    @property
+    def words(self) -> str:
+        """For the description."""
+        return DESCRIPTIONS_OF_VARIABLES.get(self.name, self.name)
+
+
+def variables_of(profile: DriverProfile) -> list[Variable]:
+    """In the order of the value references of a unit in C: inputs, outputs, seed."""
+    inputs = [
+        Variable(name, "input", min(usual(profile, name), ABSENT_DISTANCE), CONTEXT_UNITS.get(name, "-"))
+        for name in inputs_of(profile)
+    ]
+    outputs = [
+        Variable(name, "output", None, unit) for name, unit in (("offset", "m"), ("rate", "m/s"), ("heading", "rad"))
+    ]
+    position = Variable("position", "input", 0.0, "m")
+    return [*inputs, position, Variable("following", "input", True), *outputs, Variable("seed", "parameter", 0)]
+
+
+def add_units(root: Element, names: set[str]) -> Element:
+    """Definitions of units as both versions of FMI have them."""
+    definitions = SubElement(root, "UnitDefinitions")
+    for name in sorted(names):
+        unit = SubElement(definitions, "Unit", name=name)
+        SubElement(unit, "BaseUnit", {key: f"{value:.16g}" for key, value in BASE_UNITS[name].items()})
+    return definitions

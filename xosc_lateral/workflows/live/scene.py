@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
@@ -23,7 +23,7 @@ from xosc_lateral.world.scenario.place import Place
 if TYPE_CHECKING:
     import pandas as pd
 
-KINDS = {
+CATEGORY_OF_CLASS = {
     "bicycle": VehicleCategory.BICYCLE, "bus": VehicleCategory.BUS, "coach": VehicleCategory.BUS,
     "delivery": VehicleCategory.VAN, "motorcycle": VehicleCategory.MOTORBIKE, "moped": VehicleCategory.MOTORBIKE,
     "trailer": VehicleCategory.TRUCK, "tram": VehicleCategory.TRAM, "truck": VehicleCategory.TRUCK,
@@ -79,7 +79,7 @@ def sumo_entity(vehicles: Any, name: str) -> Entity:
     return Entity(
         name, EntityCategory.VEHICLE, Place("", None, "vehicle"),
         BoundingBox(-0.5 * length, 0.0, 0.5 * height, length, width, height),
-        KINDS.get(vehicles.getVehicleClass(name), VehicleCategory.CAR),
+        CATEGORY_OF_CLASS.get(vehicles.getVehicleClass(name), VehicleCategory.CAR),
     )  # fmt: skip
 
 

@@ -15,17 +15,17 @@ from xosc_lateral.base.limits import LIVE_LINE, LIVE_RANGES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.json_text import refuse_depth
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
-SIZE = {"length": 4.6, "width": 1.9, "center_x": 1.4}
+USUAL_SIZE = {"length": 4.6, "width": 1.9, "center_x": 1.4}
 """Of a vehicle that nobody knows the size of: a usual car's, from its rear axle. [m]"""
 
-_PLACE = ("road", "lane", "s")
+_PLACE_KEYS = ("road", "lane", "s")
 
-_VEHICLE_KEYS = (*_PLACE, *SIZE, "speed", "lane_width", "offset", "base", "following", "driven", "is_truck")
+_VEHICLE_KEYS = (*_PLACE_KEYS, *USUAL_SIZE, "speed", "lane_width", "offset", "base", "following", "driven", "is_truck")
 """What a line says of a vehicle beside its context."""
 
 
@@ -96,10 +96,10 @@ class Pipe:
         for vehicle, values in seen:
             if unknown := values.keys() - self._known - set(_VEHICLE_KEYS):
                 raise SimulationError(f"{vehicle}: unknown column {min(unknown)!r}; see docs/schemas/live.json")
-        placed = self.network is not None and all(all(key in values for key in _PLACE) for _, values in seen)
+        placed = self.network is not None and all(all(key in values for key in _PLACE_KEYS) for _, values in seen)
         places = self._places(seen) if placed else None
         if self.network is not None and not placed and seen:
-            raise SimulationError(f"with a road, every vehicle says {', '.join(_PLACE)}")
+            raise SimulationError(f"with a road, every vehicle says {', '.join(_PLACE_KEYS)}")
         width = _numbers(seen, "lane_width", 0.0 if placed else None)
         if places is not None and self.network is not None:
             on = places.road >= 0
@@ -138,7 +138,7 @@ class Pipe:
             poses = self.network.lane_to_world(road[on], lane[on], s[on], offset[on])
             centre = self.network.lane_to_world(road[on], lane[on], s[on])
             pose[:, on] = poses.x, poses.y, centre.heading
-        size = (_numbers(seen, key, usual) for key, usual in SIZE.items())
+        size = (_numbers(seen, key, usual) for key, usual in USUAL_SIZE.items())
         return Places(pose[0], pose[1], pose[2], road, lane, s, *size)
 
 

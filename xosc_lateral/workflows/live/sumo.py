@@ -24,7 +24,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.sumo import is_left_handed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.paths import Moves
-from xosc_lateral.workflows.live.scene import KINDS
+from xosc_lateral.workflows.live.scene import CATEGORY_OF_CLASS
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
@@ -49,7 +49,7 @@ UNDRIVEN_CLASSES = frozenset(
 )  # fmt: skip
 """Vehicle classes that have no driver of ours."""
 
-_BEND = 20.0
+_BEND_LENGTH = 20.0
 """Length over which a lane's direction gives its curvature: arcs have a point every few metres. [m]"""
 
 
@@ -127,7 +127,8 @@ class SumoRoads:
         """See `Roads`; cross slope and grade are not known."""
         places = list(zip(road.tolist(), lane.tolist(), strict=True))
         bend = [
-            np.diff(np.interp([at - 0.5 * _BEND, at + 0.5 * _BEND], *self.course(place)))[0] / _BEND
+            np.diff(np.interp([at - 0.5 * _BEND_LENGTH, at + 0.5 * _BEND_LENGTH], *self.course(place)))[0]
+            / _BEND_LENGTH
             for place, at in zip(places, s.tolist(), strict=True)
         ]
         return {
@@ -181,21 +182,10 @@ class _Vehicle:
 
 
 class SumoTraffic:
-    """Drivers of the vehicles of a SUMO simulation that runs.
+    """Drivers of the vehicles of a SUMO simulation that runs; call `steer` before (or after) every ``simulationStep``.
 
-    Call `steer` before (or after) every ``simulationStep``.
-
-    Raises `SimulationError` if the sublane model is off.
-
-    Parameters
-    ----------
-    connection : libsumo, or a connection of traci
-        With a loaded simulation.
-    profile : DriverProfile
-    ego : str or collection of str
-        Vehicles that nobody of ours drives.
-    seed, profiles, neighbours
-        See `Traffic`.
+    The `connection` is libsumo, or one of traci, with a loaded simulation. Nobody of ours drives the `ego`, one or
+    several. For `seed`, `profiles`, `neighbours` see `Traffic`. Raises `SimulationError` if the sublane model is off.
     """
 
     def __init__(
@@ -254,7 +244,7 @@ class SumoTraffic:
             if lane not in self.roads.place:  # it is being teleported
                 continue
             values = (float(x), float(y), float(vehicles.getSpeed(name)), float(vehicles.getLanePosition(name)), offset)
-            if not np.isfinite(values).all() or abs(offset) > _INVALID:
+            if not np.isfinite(values).all() or abs(offset) > _INVALID_NUMBER:
                 line = f"vehicle {name!r}: a number that is none; it is left alone"
                 if line not in self.warnings:
                     self.warnings.append(line)
@@ -284,7 +274,7 @@ class SumoTraffic:
                 [name not in self._ego and one.kind not in UNDRIVEN_CLASSES for name, one in self._known.items()],
                 np.bool_,
             ),
-            np.array([KINDS.get(one.kind) in TRUCKS for one in vehicles], dtype=np.bool_),
+            np.array([CATEGORY_OF_CLASS.get(one.kind) in TRUCKS for one in vehicles], dtype=np.bool_),
             places=Places(x, y, heading, road, lane, s, length, width, -0.5 * length),
         )  # fmt: skip
 
@@ -309,5 +299,5 @@ class SumoTraffic:
         return True
 
 
-_INVALID = 1e6
+_INVALID_NUMBER = 1e6
 """SUMO's ``INVALID_DOUBLE`` is far beyond. [m]"""

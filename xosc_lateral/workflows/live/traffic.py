@@ -25,8 +25,8 @@ from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_ha
 from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
-from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS, Moves, drive_on
-from xosc_lateral.world.surroundings.context import STEERING
+from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS_REMEMBERED, Moves, drive_on
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 from xosc_lateral.world.surroundings.give_way import Response, give_way_now
 from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
 
@@ -35,41 +35,19 @@ FORMAT = "xosc-lateral live traffic"
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What a simulation knows at one moment: a row per vehicle, shape (n,) each.
+    """What a simulation knows at one moment: a row per vehicle, shape (n,) each."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Each once.
-    speed : array
-        Along the road. [m/s]
-    lane_width : array
-        [m]
-    offset : array
-        Where the vehicle is now, from the lane's centre, positive LEFT of travel. [m]
-    following : array of bool
-        It follows the road: no maneuver moves it sideways, and its lateral place is its driver's.
-    driven : array of bool
-        It has a driver of ours; the vehicle under test has none, and is seen by the others.
-    is_truck : array of bool
-    base : array, optional
-        Nominal offset that the driver's is added to (what a lane offset action left); 0 without. [m]
-    context : mapping of str to array
-        Further context columns, or ones that replace what places say; NaN: there is none.
-    places : Places, optional
-        For the vehicles around. Without, nobody knows of anybody but by `context`.
-    """
-
-    names: tuple[str, ...]
-    speed: FloatArray
-    lane_width: FloatArray
-    offset: FloatArray
-    following: BoolArray
-    driven: BoolArray
+    names: tuple[str, ...]  # Each once.
+    speed: FloatArray  # Along the road. [m/s]
+    lane_width: FloatArray  # [m]
+    offset: FloatArray  # Where the vehicle is now, from the lane's centre, positive LEFT of travel. [m]
+    following: BoolArray  # No maneuver moves it sideways, and its lateral place is its driver's.
+    driven: BoolArray  # It has a driver of ours; the vehicle under test has none, and is seen by the others.
     is_truck: BoolArray
-    base: FloatArray | None = None
+    base: FloatArray | None = None  # Offset that the driver's is added to (what a lane offset action left). [m]
+    # Further context columns, or ones that replace what places say; NaN: there is none.
     context: Mapping[str, FloatArray] = field(default_factory=dict)
-    places: Places | None = None
+    places: Places | None = None  # For the vehicles around. Without, nobody knows of anybody but by `context`.
 
     @cached_property
     def nominal(self) -> FloatArray:
@@ -80,18 +58,9 @@ class Moment:
 class Traffic:
     """The drivers of many vehicles: ``Traffic(profile, seed=1).step(time, moment)``.
 
-    Parameters
-    ----------
-    profile, profiles : DriverProfile, mapping of str to DriverProfile
-        Who drives; by vehicle where it is another.
-    seed : int
-        A vehicle's random numbers follow from it and the vehicle's name, as in a conversion: same seed, same drivers.
-    roads : Roads, optional
-        Of the simulation; without, `Moment.places` serve for giving way alone.
-    neighbours : Neighbours
-        See `conversion.enrich`.
-    left_hand : bool
-        One keeps left here.
+    `profile` drives, or another of `profiles` by the vehicle's name. A vehicle's random numbers follow from `seed` and
+    its name, as in a conversion: same seed, same drivers. Without `roads`, `Moment.places` serve for giving way alone,
+    as far as `neighbours` says; `left_hand`: one keeps left here.
     """
 
     def __init__(
@@ -189,7 +158,7 @@ class Traffic:
             k = self._index.get(name)
             if k is not None and self._state["begun"][k]:
                 change = moment.speed[row] - self._state["speeds"][k, 0]
-                columns["acceleration"][row] = change / (SPEEDS - 1) / self._step
+                columns["acceleration"][row] = change / (SPEEDS_REMEMBERED - 1) / self._step
         if moment.places is not None and self._roads is not None:
             columns |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
         columns |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
@@ -210,20 +179,21 @@ class Traffic:
             self._knots = self._knots_until(time) - 1
         due = self._knots_until(time) - self._knots
         self._knots += due
+        wanted = self._aside(moment, there, all_drivers)
         row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
-        known = {name for _, members in self._groups.values() for name in members}
-        for key in dict.fromkeys(self._profile_key(name) for name in row):
+        for key, profile in self._profiles.items():
+            names = [name for name in row if self._profile_key(name) == key]
+            if not names:
+                continue
             if key not in self._groups:
-                self._groups[key] = (OffsetGroup(self._profiles[key], self._columns), [])
+                self._groups[key] = (OffsetGroup(profile, self._columns), [])
             group, members = self._groups[key]
-            new = [name for name in row if name not in known and self._profile_key(name) == key]
+            known = set(members)
+            new = [name for name in names if name not in known]
             group.add([self.seed_of(name) for name in new])
             members += new
-        for key, (group, members) in self._groups.items():
-            if not members:
-                continue
             rows, drivers = np.array([row[name] for name in members]), [self._index[name] for name in members]
-            other_hand = self._profiles[key].left_hand != self._left_hand
+            other_hand = profile.left_hand != self._left_hand
             seen = mirrored_context(context) if other_hand else context
             for _ in range(due):
                 curve = group.advance(
@@ -235,12 +205,12 @@ class Traffic:
         state["speeds"][all_drivers[is_new]] = moment.speed[there][is_new, None]
         state["begun"][all_drivers] = True
         state["speeds"][all_drivers] = np.column_stack([state["speeds"][all_drivers, 1:], moment.speed[there]])
-        state["wanted"][all_drivers] = self._aside(moment, there, all_drivers)[there]
+        state["wanted"][all_drivers] = wanted[there]
 
     def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
         """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
         before = np.where(self._state["width"][drivers] > 0.0, self._state["width"][drivers], width)
-        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
+        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING_DURATION)
         return np.asarray(self._state["width"][drivers])
 
     def _aside(self, moment: Moment, there: IntArray, drivers: IntArray) -> FloatArray:
@@ -248,10 +218,9 @@ class Traffic:
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
         response = Response(*np.zeros((4, len(moment.names)), dtype=np.bool_))
-        for key, (_, members) in self._groups.items():
-            profile = self._profiles[key]
+        for key, profile in self._profiles.items():
             other_hand = profile.left_hand != self._left_hand
-            rows = there[np.isin(drivers, [self._index[name] for name in members])]
+            rows = [k for k in there.tolist() if self._profile_key(moment.names[k]) == key]
             for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
                 for side in sides_known(profile, basis, other_hand=other_hand):
                     getattr(response, f"{word}_{side}")[rows] = True

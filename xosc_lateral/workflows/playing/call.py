@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,13 +83,11 @@ def segments(
     return Segments(scenario_segments(played._played), lines)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Playback(Result):
     """Nominal motion: what the maneuvers alone give."""
 
-    __slots__ = ("_played",)
-
-    def __init__(self, played: Played) -> None:
-        self._played = played
+    _played: Played
 
     @property
     def scenario(self) -> Path:
@@ -175,7 +174,7 @@ class Playback(Result):
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
         from xosc_lateral.files.openscenario.provenance import facts_in
-        from xosc_lateral.workflows.playing.page import view_page
+        from xosc_lateral.workflows.playing.figures import view_page
 
         motion, network = self._played.motion, self._played.network
         converted = facts_in(self.scenario.read_bytes())
@@ -205,15 +204,13 @@ class Playback(Result):
         return {"inputs": parsed_hashes(self._inputs())}
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Segments(Result):
     """Segments of all entities, road-following or not."""
 
-    __slots__ = ("_rows", "controllers")
-
-    def __init__(self, rows: tuple[SegmentRow, ...], controllers: tuple[str, ...] = ()) -> None:
-        self._rows = rows
-        self.controllers = controllers
-        """Which controllers drive which entity at some time, a line each."""
+    _rows: tuple[SegmentRow, ...]
+    controllers: tuple[str, ...] = ()
+    """Which controllers drive which entity at some time, a line each."""
 
     def __len__(self) -> int:
         return len(self._rows)

@@ -1,8 +1,10 @@
-"""Figures of a scenario: paths over the road, and what happens over time."""
+"""Figures of a scenario, paths over the road and what happens over time, and the page of one that was played."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +12,20 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
-from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.workflows.playing.scene import lane_surfaces, markings, scene_of
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, Note
 from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 
 Rows = NDArray[np.int64]
 
 ROW_STEP = 0.1
 """Rows that are drawn. [s]"""
 
-MARGIN = 30.0
+ROAD_MARGIN = 30.0
 """Road that is drawn before and after the paths. [m]"""
 
 MOST_ROADS = 3
@@ -30,7 +34,7 @@ MOST_ROADS = 3
 MOST_NAMED = 12
 """Entities up to which a figure of all has a legend."""
 
-COMFORTABLE = 0.5
+USUAL_ACCELERATION = 0.5
 """Lateral acceleration that real drivers seldom exceed while they keep their lane, beyond what the road asks. [m/s2]"""
 
 
@@ -77,7 +81,7 @@ def paths_stretched(enriched: Enriched) -> Figure | None:
         return None
     figure = Figure(len(roads), height=185.0, legend=len(enriched.entities) <= MOST_NAMED)
     for panel, (road, (first, last)) in zip(figure.panels, roads, strict=True):
-        panel.x.limits, panel.y.limits = (first - MARGIN, last + MARGIN), _shown_t(enriched, road)
+        panel.x.limits, panel.y.limits = (first - ROAD_MARGIN, last + ROAD_MARGIN), _shown_t(enriched, road)
         for kind, s, right, left in lane_surfaces(enriched.network, road, *panel.x.limits):
             if kind in DRIVING:
                 panel.band(s, right, left, SHADE)
@@ -205,16 +209,16 @@ def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]
     for panel, entity in zip(figure.panels, entities, strict=True):
         rows = shown_rows(entity.motion)
         time, added = entity.motion.time[rows], entity.lateral_acceleration()[rows]
-        for bound in (-COMFORTABLE, COMFORTABLE):
+        for bound in (-USUAL_ACCELERATION, USUAL_ACCELERATION):
             panel.level(bound, color=NOMINAL, dashes=DASHED)
         panel.line(time, added, color_of(_number_of(enriched, entity)), label="added")
     return figure
 
 
-PEAKS = (0.52, 0.95)
+PEAK_SPEEDS = (0.52, 0.95)
 """Largest lateral speed of real lane changes, 5 and 95 % of 323 on vehicle motorway. [m/s]"""
 
-SHOWN_BESIDE = 3.0
+SHOWN_TIME_BESIDE = 3.0
 """Time before and after a lane change that is drawn with it. [s]"""
 
 
@@ -224,9 +228,9 @@ def lane_changes_over_time(enriched: Enriched, chosen: Sequence[tuple[EntityResu
     for panel, (entity, crossing) in zip(figure.panels, chosen, strict=True):
         time, side = entity.motion.time, np.sign(crossing.way[-1])
         begin, end = time[crossing.first], time[crossing.last]
-        rows = slice(*np.searchsorted(time, (begin - SHOWN_BESIDE, end + SHOWN_BESIDE)))
+        rows = slice(*np.searchsorted(time, (begin - SHOWN_TIME_BESIDE, end + SHOWN_TIME_BESIDE)))
         way = np.interp(time[rows], time[crossing.first : crossing.last + 1], crossing.way)
-        panel.band(time[rows], PEAKS[0], PEAKS[1], SHADE)
+        panel.band(time[rows], PEAK_SPEEDS[0], PEAK_SPEEDS[1], SHADE)
         for added, style in ((0.0, {"dashes": DASHED}), (entity.deviation[rows], {})):
             color = color_of(_number_of(enriched, entity)) if not style else NOMINAL
             panel.line(time[rows], side * np.gradient(way + added, time[rows]), color, **style)
@@ -248,3 +252,57 @@ def timeline(enriched: Enriched) -> Figure:
     panel.y.limits, panel.y.grid = (count - 0.5, -0.5), False
     panel.x.label = "time [s]"
     return figure
+
+
+# ---- The page of a played scenario, before anything is converted ----
+def view_page(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    *,
+    source: str,
+    provenance: Mapping[str, object],
+    converted: Mapping[str, Any] | None = None,
+) -> str:
+    """HTML page with the player, self-contained; same input, same bytes.
+
+    `source`: file name, for the reader; `provenance`: for the footer; `converted`: what the file says of its
+    conversion, if it was converted.
+    """
+    page, profiles = Page(Path(source).name), (converted or {}).get("profiles")
+    drivers = ", ".join(sorted(profiles)) if isinstance(profiles, Mapping) and profiles else "nobody"
+    count = len(motion.entities)
+    page.lead(
+        f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
+        + (NOT_CONVERTED if converted is None else f"Converted by xosc-lateral, with lateral movement of {drivers}.")
+    )
+    page.section(
+        "Player",
+        "The scenario from above. A lateral stretch above 1 widens the road. Click a vehicle to follow it, point at it "
+        "for its values, drag to look elsewhere.",
+    )
+    page.player(scene_of(motion, network), "Scenario from above")
+    page.section("Speed")
+    page.figure(
+        speeds_over_time(motion),
+        "Speed over time. Click to take the player to that time.",
+        "Speed over time of every entity",
+        over_time=True,
+    )
+    add_notes(page, motion.notes)
+    return page.html(provenance)
+
+
+NOT_CONVERTED = "The maneuvers are played as the scenario states them; no lateral movement was added to them."
+
+
+def add_notes(page: Page, notes: Sequence[Note]) -> None:
+    """The section on what was not played as the scenario states it."""
+    page.section("Not played as written")
+    if not notes:
+        page.text("Nothing: every action and condition was played as the scenario states it.")
+        return
+    rows = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in notes
+    ]
+    page.table(rows, "What was left out or played differently")

@@ -22,13 +22,13 @@ from xosc_lateral.world.road.positions import RoadMark
 
 RowArray = NDArray[np.int64]
 
-FRAME = 0.1
+FRAME_STEP = 0.1
 """Between two frames; the player interpolates, which is off by 6 mm at 5 m/s2. [s]"""
 
 MOST_FRAMES = 60_000
 """Frames of all entities together beyond which they are spaced farther apart: what a browser takes at once."""
 
-MILLI, ANGLE, LINE = 1e-3, 1e-4, 5e-3
+POSITION_RESOLUTION, HEADING_RESOLUTION, LINE_RESOLUTION = 1e-3, 1e-4, 5e-3
 """Resolution of positions [m] and speeds [m/s]; of headings, 0.5 mm at the end of a car of 5 m [rad]; of lines [m]."""
 
 ROAD_REACH = 250.0
@@ -37,13 +37,13 @@ ROAD_REACH = 250.0
 ROAD_WIDTH = 7.0
 """Shown where there is no road. [m]"""
 
-PLACES = 20
+WIDTH_SAMPLES = 20
 """At which it is looked how wide the road is. [-]"""
 
-PIECE = 200.0
+PIECE_LENGTH = 200.0
 """Length of one piece of a lane or marking: pieces out of sight are not drawn. [m]"""
 
-TOLERANCE = 0.01
+LINE_TOLERANCE = 0.01
 """Lines are simplified to this: less than a tenth of a marking's width. [m]"""
 
 
@@ -57,7 +57,7 @@ def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[Enti
     # whole metres near the first place: coordinates stay small on roads with geographic ones
     origin = np.round(places[0][0]) if places else np.zeros(2)
     scene = {
-        "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME, 9),
+        "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME_STEP, 9),
         "frames": len(rows),
         "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
@@ -77,7 +77,7 @@ def _across(network: RoadNetwork, shown: Sequence[tuple[int, EntityMotion, Entit
         return ROAD_WIDTH
     there = np.flatnonzero(_present(first) & (first.road >= 0))
     reach = [ROAD_WIDTH / 2]
-    for row in there[:: max(1, len(there) // PLACES)].tolist():
+    for row in there[:: max(1, len(there) // WIDTH_SAMPLES)].tolist():
         road, s = int(first.road[row]), float(first.s[row])
         t = float(network.offset_to_t(road, int(first.lane[row]), s, float(first.offset[row])))
         lanes = [lane for lane in network.lanes_at(road, s) if lane.type in DRIVING]
@@ -96,8 +96,8 @@ def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
 
 def _rows(motion: NominalMotion, entities: int) -> RowArray:
     count = len(motion.entities[0].time) if motion.entities else 0
-    frames = max(1, count * motion.step / FRAME * entities)
-    every = max(1, round(FRAME / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
+    frames = max(1, count * motion.step / FRAME_STEP * entities)
+    every = max(1, round(FRAME_STEP / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
     return np.arange(0, count, every)
 
 
@@ -126,13 +126,13 @@ def _entity(
         "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
         "jumps": (1 + np.flatnonzero(np.diff(placed))).tolist(),  # frames that nobody reaches by moving
         "lanes": _lane_changes(network, motion, rows),
-        "course": packed(np.unwrap(_filled(_course(motion)[rows])), ANGLE),
+        "course": packed(np.unwrap(_filled(_course(motion)[rows])), HEADING_RESOLUTION),
         "nominal": _path(motion, rows, origin),
-        "offset": packed(_filled(motion.offset[rows]), MILLI),
+        "offset": packed(_filled(motion.offset[rows]), POSITION_RESOLUTION),
     }
     if result is not None and result.is_enriched:
         values["enriched"] = _path(result.trajectory, rows, origin)
-        values["added"] = packed(_filled(result.deviation[rows]), MILLI)
+        values["added"] = packed(_filled(result.deviation[rows]), POSITION_RESOLUTION)
     return values
 
 
@@ -144,10 +144,10 @@ def _course(motion: EntityMotion) -> FloatArray:
 
 def _path(path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray) -> dict[str, Any]:
     return {
-        "x": packed(_filled(path.x[rows] - origin[0]), MILLI),
-        "y": packed(_filled(path.y[rows] - origin[1]), MILLI),
-        "h": packed(np.unwrap(_filled(path.heading[rows])), ANGLE),
-        "v": packed(_filled(path.speed[rows]), MILLI),
+        "x": packed(_filled(path.x[rows] - origin[0]), POSITION_RESOLUTION),
+        "y": packed(_filled(path.y[rows] - origin[1]), POSITION_RESOLUTION),
+        "h": packed(np.unwrap(_filled(path.heading[rows])), HEADING_RESOLUTION),
+        "v": packed(_filled(path.speed[rows]), POSITION_RESOLUTION),
     }
 
 
@@ -177,15 +177,15 @@ def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict
     def line(road: int, s: FloatArray, t: FloatArray) -> FloatArray:
         poses = network.road_to_world(road, s, t)
         places = np.column_stack([poses.x, poses.y]) - origin
-        return places[simplify(places[:, 0], places[:, 1], TOLERANCE)]
+        return places[simplify(places[:, 0], places[:, 1], LINE_TOLERANCE)]
 
     def drawn(places: FloatArray, **what: Any) -> dict[str, Any]:
-        return what | {"x": packed(places[:, 0], LINE), "y": packed(places[:, 1], LINE)}
+        return what | {"x": packed(places[:, 0], LINE_RESOLUTION), "y": packed(places[:, 1], LINE_RESOLUTION)}
 
     for road in range(len(network.roads)):
         for first, last in _pieces_near(network, road, near):
             for kind, s, right, left in lane_surfaces(network, road, first, last):
-                if (left - right).max() >= TOLERANCE:
+                if (left - right).max() >= LINE_TOLERANCE:
                     outline = np.concatenate([line(road, s, left), line(road, s, right)[::-1]])
                     lanes.append(drawn(outline, type="driving" if kind in DRIVING else kind))
             for mark, s, t in markings(network, road, first, last):
@@ -195,9 +195,9 @@ def _roads(network: RoadNetwork, places: FloatArray, origin: FloatArray) -> dict
 
 
 def _pieces_near(network: RoadNetwork, road: int, near: set[tuple[int, int]]) -> Iterator[tuple[float, float]]:
-    """Parts of a road, as (first, last) s, that lie in those squares, at most `PIECE` long each."""
+    """Parts of a road, as (first, last) s, that lie in those squares, at most `PIECE_LENGTH` long each."""
     length = network.roads[road].length
-    edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE))) + 1).tolist()
+    edges = np.linspace(0.0, length, max(1, int(np.ceil(length / PIECE_LENGTH))) + 1).tolist()
     for first, last in pairwise(edges):
         poses = network.road_to_world(road, np.linspace(first, last, 5))
         cells = np.floor(np.column_stack([poses.x, poses.y]) / ROAD_REACH)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.files.output_paths import claim, output_folder, template_mark
 from xosc_lateral.workflows.result import PathLike, Result
 
@@ -26,7 +28,7 @@ def list_templates(name: str | None = None) -> TemplateList:
     """
     from xosc_lateral.files.templates import all_templates, find_template
 
-    return TemplateList(all_templates() if name is None else (find_template(name),), detailed=name is not None)
+    return TemplateList(all_templates() if name is None else (find_template(name),), name is not None)
 
 
 def write_template(name: str, folder: PathLike, *, force: bool = False, **settings: object) -> tuple[Path, ...]:
@@ -65,13 +67,12 @@ def write_template(name: str, folder: PathLike, *, force: bool = False, **settin
     return tuple(paths)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class TemplateList(Result):
     """Templates with their settings."""
 
-    __slots__ = ("_detailed", "_templates")
-
-    def __init__(self, templates: tuple[AnyTemplate, ...], *, detailed: bool) -> None:
-        self._templates, self._detailed = templates, detailed
+    _templates: tuple[AnyTemplate, ...]
+    _detailed: bool
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -115,5 +116,4 @@ def _settings(parameters: Sequence[Parameter]) -> list[str]:
         (one.name, one.shown_default, "" if one.unit == "-" else one.unit, f"({one.allowed})", one.what)
         for one in parameters
     ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    return [f"  {line}" for line in aligned(rows)]

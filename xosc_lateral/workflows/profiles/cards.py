@@ -21,7 +21,7 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page, format_value
 from xosc_lateral.files.profiles import FIELDS, Entry, facts_of, profile_hash
 
-CHANGED: Mapping[Acts, str] = {
+TARGET_WORDS: Mapping[Acts, str] = {
     Acts.LOCATION: "mean offset",
     Acts.SPREAD: "spread",
     Acts.RATE: "rate of mean reversion",
@@ -154,7 +154,7 @@ def effect_line(effect: Effect) -> str:
         lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
         response = f", response time {effect.response_time:g} s" if effect.response_time else ""
         course = ", a course over time" if effect.course else ""
-        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
+        return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
     kind = str(plain.pop("kind")).replace("-", " ")
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
@@ -183,29 +183,26 @@ def _amount(known: Provenance) -> str:
     return f"{time}, {vehicles}, {known.runs} runs"
 
 
-def _outcome(known: Provenance) -> list[tuple[str, str]]:
+def _outcome(known: Provenance) -> Iterator[tuple[str, str]]:
     """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
     try:
-        return list(_outcome_items(known.fit.get("closed_loop"), known.evaluation))
+        evaluation = known.evaluation
+        if loop := known.fit.get("closed_loop"):
+            names = ", ".join(loop["found"]) or "nothing"
+            yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {names}"
+        if short := evaluation.get("snippets"):
+            scores = (
+                f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+                f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+            )
+            yield "held out", f"{evaluation.get('held_out', '')}: {scores}"
+        if (error := evaluation.get("spectrum_error_db")) is not None:
+            differs = f"the driver alone differs from what was recorded by {error:.1f} dB"
+            yield "spectrum", f"{differs} (rms over frequency bands)"
+        if evaluation.get("told_apart"):
+            yield "own driver", str(evaluation["told_apart"])
     except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
-        return [("evaluation", "not as this package writes it")]
-
-
-def _outcome_items(loop: Mapping[str, Any] | None, evaluation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    if loop:
-        names = ", ".join(loop["found"]) or "nothing"
-        yield "loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {names}"
-    if short := evaluation.get("snippets"):
-        scores = (
-            f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
-            f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
-        )
-        yield "held out", f"{evaluation.get('held_out', '')}: {scores}"
-    if (error := evaluation.get("spectrum_error_db")) is not None:
-        differs = f"the driver alone differs from what was recorded by {error:.1f} dB"
-        yield "spectrum", f"{differs} (rms over frequency bands)"
-    if evaluation.get("told_apart"):
-        yield "own driver", str(evaluation["told_apart"])
+        yield "evaluation", "not as this package writes it"
 
 
 # ---- the page --------------------------------------------------------------------------------------------------------

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
-from xosc_lateral.drivers.evaluation.sizes import FAST_S, LEVEL, QUANTITIES, SLOW_S, Difference, surest
+from xosc_lateral.drivers.evaluation.sizes import FAST_S, QUANTITIES, SIGNIFICANCE_LEVEL, SLOW_S, Difference, surest
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -21,25 +22,19 @@ from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
 
 SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
-SPACING = 0.8  # Between the zero lines of two sample paths. [m]
+PATH_SPACING = 0.8  # Between the zero lines of two sample paths. [m]
 MAXIMUM_DRAWN = 12  # So many profiles are drawn at most; the distances are of all.
 
 
 def comparison_text(compared: Compared) -> str:
     """A table of the profiles, and one of their pairs: verdict, distance, what they differ by."""
-    lines = [*_table([_row(each) for each in compared.profiles]), f"{FIGURES_NOTE}.", "", *_table(_pairs(compared))]
-    lines.append(f"{_distance_note(compared)}.")
+    profiles, pairs = (
+        aligned([list(rows[0]), *(list(row.values()) for row in rows)])
+        for rows in ([_row(each) for each in compared.profiles], _pairs(compared))
+    )
+    lines = [*profiles, f"{FIGURES_NOTE}.", "", *pairs, f"{_distance_note(compared)}."]
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(lines)
-
-
-def _table(rows: list[dict[str, str]]) -> list[str]:
-    """Aligned columns under their names."""
-    widths = [max(len(column), *(len(row[column]) for row in rows)) for column in rows[0]]
-    return [
-        "  ".join(f"{text:<{width}}" for text, width in zip(texts, widths, strict=True)).rstrip()
-        for texts in (list(rows[0]), *(list(row.values()) for row in rows))
-    ]
 
 
 FIGURES_NOTE = (
@@ -57,7 +52,7 @@ def _distance_note(compared: Compared) -> str:
         f"differ: {scale['mean']:.2f} m in their mean, {scale['std']:.2f} m in their standard deviation. Mean offset: "
         f"the second's less the first's; movement, slow (beyond {SLOW_S:g} s) and fast (from {FAST_S:g} s): the "
         f"second's over the first's; 95 % intervals by the drives of the fits. Told apart is what has a p below "
-        f"{LEVEL:g}, all three considered; of others, what as much driving would show in 4 of 5 cases"
+        f"{SIGNIFICANCE_LEVEL:g}, all three considered; of others, what as much driving would show in 4 of 5 cases"
     )
 
 
@@ -78,7 +73,7 @@ def _pairs(compared: Compared) -> list[dict[str, str]]:
 def _verdict(parts: Sequence[Difference]) -> str:
     """What tells two profiles apart; else what would, in as much driving as there was."""
     p_value = surest(parts)
-    if p_value <= LEVEL:
+    if p_value <= SIGNIFICANCE_LEVEL:
         surely = "p < 1e-06" if p_value < 1e-6 else f"p = {p_value:.1g}"
         return f"differ in {min(parts, key=lambda part: part.p_value).quantity}, {surely}"
     least = (f"{np.exp(part.least):.1f} times" if part.is_factor else f"{part.least:.2f} m" for part in parts)
@@ -163,12 +158,12 @@ def comparison_figure(compared: Compared) -> Figure:
         heights, edges = np.histogram(each.runs, np.linspace(-1.0, 1.0, 81), density=True)
         place.line(0.5 * (edges[1:] + edges[:-1]), heights, color, label=name)
         power.line(each.spectrum.frequency, each.spectrum.density, color, label=name)
-        run = each.runs[0][: round(SHOWN_S / step)] + SPACING * (len(shown) - number)
+        run = each.runs[0][: round(SHOWN_S / step)] + PATH_SPACING * (len(shown) - number)
         paths.line(step * np.arange(len(run)), run, color, label=name)
     power.x.log = power.y.log = True
     place.title, place.x.label, place.y.label = "Distribution", "offset [m], positive to the left", "density [1/m]"
     power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
-    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {SPACING:g} m apart", "time [s]", []
+    paths.title, paths.x.label, paths.y.ticks = f"Sample paths, {PATH_SPACING:g} m apart", "time [s]", []
     return figure
 
 

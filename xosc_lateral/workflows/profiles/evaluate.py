@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -53,7 +54,7 @@ def evaluate(
     classify : bool
         Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
     """
-    from xosc_lateral.drivers.drives.cuts import all_runs
+    from xosc_lateral.drivers.drives.drive import all_runs
     from xosc_lateral.drivers.evaluation.scores import score_profile
 
     driver = given_profile(profile, library)
@@ -63,14 +64,13 @@ def evaluate(
     return Evaluation(scores, driver, tables)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Result):
     """Scores of a profile on measured drives."""
 
-    __slots__ = ("_given", "_scores", "profile")
-
-    def __init__(self, scores: ProfileScores, profile: DriverProfile, tables: GivenDrives) -> None:
-        self._scores, self._given = scores, tables
-        self.profile = profile
+    _scores: ProfileScores
+    profile: DriverProfile
+    _tables: GivenDrives
 
     @property
     def ratio(self) -> float:
@@ -98,7 +98,7 @@ class Evaluation(Result):
     def __str__(self) -> str:
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_text
 
-        return evaluation_text(self._scores, self.profile, self._given.inputs)
+        return evaluation_text(self._scores, self.profile, self._tables.inputs)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
@@ -115,7 +115,7 @@ class Evaluation(Result):
         """Plain values, as ``--json`` prints them."""
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_record
 
-        return evaluation_record(self._scores, self.profile, self._given.inputs)
+        return evaluation_record(self._scores, self.profile, self._tables.inputs)
 
     def plot(self) -> Figure:
         """Violins of the ten metrics, measured beside sampled."""
@@ -128,6 +128,6 @@ class Evaluation(Result):
         """Write the HTML page."""
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_page
 
-        name, tables = f"{self.profile.name}_evaluation.html", self._given
+        name, tables = f"{self.profile.name}_evaluation.html", self._tables
         made = partial(evaluation_page, self._scores, self.profile, tables.inputs)
         return write_page(path, name, made, inputs=tables.files, force=force)

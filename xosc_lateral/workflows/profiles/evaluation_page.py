@@ -20,14 +20,14 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.realism_text import (
-    FAMILIES,
+    FAMILY_LABELS,
     condition_groups,
     indicator_rows,
     ratio_rows,
     realism_lines,
     start_fade_note,
 )
-from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
+from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
 
 
 def trace_figure(scores: ProfileScores) -> Figure:
@@ -69,7 +69,7 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     block, ratio = worst_block(scores)
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
-        *([FITTED] if _fitted_on(profile, inputs) else []),
+        *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
         f"verdict: {scores.verdict.in_words()}",
         scores.verdict.alarm_words(),
         f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
@@ -96,7 +96,9 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     return "\n".join(lines)
 
 
-FITTED = "The profile was fitted to these drives: the scores say how well it describes them, not how it does on others."
+FITTED_NOTE = (
+    "The profile was fitted to these drives: the scores say how well it describes them, not how it does on others."
+)
 
 
 def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> dict[str, Any]:
@@ -121,7 +123,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     )
     page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
-        page.warning(FITTED)
+        page.warning(FITTED_NOTE)
     _add_realism(page, scores.realism)
     page.section("Traces")
     page.figure(
@@ -153,7 +155,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         [
             {"evaluation": f"({each.number})", "coarse part": each.coarse, "fine part": each.fine}
             | {"mean distance": each.distances.mean}
-            | {LABELS[name]: each.distances.by_metric[name] for name in ("std", "range", "diff_mean", "diff_std")}
+            | {METRIC_WORDS[name]: each.distances.by_metric[name] for name in ("std", "range", "diff_mean", "diff_std")}
             for each in scores.evaluations
         ]
     )
@@ -223,7 +225,7 @@ def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
 
 def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
     """Each metric and their mean: name, distance, and that between real drivers, in standard deviations."""
-    rows = [(LABELS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
+    rows = [(METRIC_WORDS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
     return [*rows, ("mean", scores.distances.mean, scores.floor.mean)]
 
 
@@ -267,7 +269,7 @@ def blocks_of(scores: ProfileScores) -> dict[str, float]:
     for each in scores.realism.conditions:
         for family, beside in each.families.items():
             if isfinite(beside.ratio):
-                blocks[f"{FAMILIES[family]}, {each.condition.name}"] = beside.ratio
+                blocks[f"{FAMILY_LABELS[family]}, {each.condition.name}"] = beside.ratio
         for name, area in (("classifier", each.alone), ("classifier with context", each.jointly)):
             if area is not None:
                 blocks[f"{name}, {each.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
 
-PRIOR = "rural"
+PRIOR_PROFILE = "rural"
 """Profile of the library whose fast movement stands in where a recording shows none: fitted to differential GNSS."""
 
 
@@ -64,7 +64,7 @@ def fit(
     prior: Annotated[ProfileLike | None, flag(
         kind=str, read=lambda text: None if text == "none" else text, metavar="PROFILE|none",
         help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
-    )] = PRIOR,
+    )] = PRIOR_PROFILE,
     library: Paths = (),
 ) -> DriverProfile:  # fmt: skip
     """Fit a driver profile.
@@ -96,14 +96,14 @@ def fit(
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
-    by_default = isinstance(prior, str) and prior == PRIOR
-    known = Provenance(
-        source=source or ", ".join(tables.inputs),
-        licence=licence,
-        inputs=dict(tables.inputs),
-        fit=dict(summary_of(tables.drives)),
-    )
+    by_default = isinstance(prior, str) and prior == PRIOR_PROFILE
     with naming(tables):
+        known = Provenance(
+            source=source or ", ".join(tables.inputs),
+            licence=licence,
+            inputs=dict(tables.inputs),
+            fit=dict(summary_of(tables.drives)),
+        )
         profile = fit_profile(
             tables.drives,
             name=name or (tables.files[0].name.split(".")[0] if tables.files else "profile"),
@@ -112,7 +112,7 @@ def fit(
             sensor_noise=sensor_noise,
             neighbours=neighbours,
             prior=None if prior is None or by_default else given_profile(prior, library),
-            stand_in=(lambda: given_profile(PRIOR, library)) if by_default else None,
+            stand_in=(lambda: given_profile(PRIOR_PROFILE, library)) if by_default else None,
         )
     if corrected and isinstance(profile.model, TwoLevelModel):
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
@@ -122,6 +122,6 @@ def fit(
 
 def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
     """What to know about a fitted profile, and the error of its sensor as far as it was given [m], in lines."""
-    from xosc_lateral.drivers.fitting import warnings
+    from xosc_lateral.drivers.fitting import fitting
 
-    return warnings.fit_warnings(profile, sensor_noise, given_profile(PRIOR))
+    return fitting.fit_warnings(profile, sensor_noise, given_profile(PRIOR_PROFILE))

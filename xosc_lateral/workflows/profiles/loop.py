@@ -79,12 +79,13 @@ def close_loop(
     # a mapping file serves many tables: what it says of columns that these lack is no mistake
     there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
     of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
+    fitted_on = set() if base is None else set(base.provenance.inputs.values())
     with naming(inputs):
         result = close.close_loop(
             inputs.drives,
             base,
             seed=seed,
-            in_sample=base is not None and _is_of(base, inputs),
+            in_sample=bool(fitted_on) and fitted_on <= set(inputs.inputs.values()),
             name=name,
             provenance=Provenance(source=", ".join(inputs.inputs), inputs=dict(inputs.inputs)),
             excluded=list(leave_out),
@@ -94,12 +95,6 @@ def close_loop(
     if base is not None:
         result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
     return ClosedLoop(result, inputs)
-
-
-def _is_of(base: DriverProfile, inputs: GivenDrives) -> bool:
-    """Whether a profile was fitted on these very drives, and on no others."""
-    fitted = set(base.provenance.inputs.values())
-    return bool(fitted) and fitted <= set(inputs.inputs.values())
 
 
 class ClosedLoop(Result):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.loop.close import LoopResult
 from xosc_lateral.drivers.loop.identify import hold_out_blocks
 from xosc_lateral.drivers.loop.terms.between import is_between
-from xosc_lateral.drivers.loop.terms.regimes import RegimesTerm
+from xosc_lateral.drivers.loop.terms.hidden import RegimesTerm
 from xosc_lateral.drivers.loop.timeline import LOCAL_S, Timeline, coarse_mean, coarse_middle, local_mean
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Product
 
@@ -60,9 +61,12 @@ def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> Floa
 
     Of the movement within 20 s, or for fine noise from sample to sample.
     """
-    if effect.acts is Acts.LOCATION:
-        return _alone(result, effect)
-    timeline = result.coarse.timeline
+    coarse, fitted, timeline = result.coarse, result.final, result.coarse.timeline
+    if effect.acts is Acts.LOCATION:  # less intercepts and all other effects on the mean
+        rest = coarse.offset - fitted.columns @ fitted.sizes
+        if is_between(effect):  # the places that the drives keep are what it explains
+            return np.asarray(rest)
+        return np.asarray(rest - fitted.levels[coarse.drive] + coarse_mean(coarse.strength(effect)))
     fine = effect.acts is Acts.FINE
     offset = timeline.offset
     squares = coarse_mean(np.square(np.diff(offset, prepend=offset[:1]) if fine else _fast(offset, timeline)))
@@ -97,16 +101,6 @@ def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, Floa
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
         return coarse_middle(column), coarse_mean(strength)
     return coarse_mean(coarse.timeline.respond(column, effect.lag_s, effect.response_s)), coarse_mean(strength)
-
-
-def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
-    """Offsets less intercepts and all other effects on the mean, at 1 Hz. [m]"""
-    coarse, fitted = result.coarse, result.final
-    rest = coarse.offset - fitted.columns @ fitted.sizes
-    if is_between(effect):  # the places that the drives keep are what it explains
-        return np.asarray(rest)
-    rest = rest - fitted.levels[coarse.drive]
-    return np.asarray(rest + coarse_mean(coarse.strength(effect)))
 
 
 def _fast(offset: FloatArray, timeline: Timeline) -> FloatArray:
@@ -195,10 +189,8 @@ def longest_parts(result: LoopResult) -> list[slice]:
     """Rows of the longest stretch within one held-out block, of the drives that have the longest; drives in order."""
     timeline = result.coarse.timeline
     block = np.where(timeline.valid, hold_out_blocks(timeline), -1)
-    edges = np.flatnonzero(np.diff(block, prepend=-2, append=-2))
-    starts, stops = edges[:-1], edges[1:]
     longest: dict[int, slice] = {}
-    for start, stop in zip(starts, stops, strict=True):
+    for start, stop in pairwise(np.flatnonzero(np.diff(block, prepend=-2, append=-2))):
         drive = int(timeline.drive[start])
         known = longest.get(drive, slice(0, 0))
         if block[start] >= 0 and stop - start > known.stop - known.start:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -18,26 +17,19 @@ from xosc_lateral.drivers.loop.timeline import coarse_mean
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.files.pages.chart import BLUE, DASHED, MUTED, ORANGE, VERMILLION, Panel
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.profiles.loop_curves import (
-    MovingStatistic,
-    curve_of,
-    hidden_mean,
-    longest_parts,
-    moving_mean,
-    moving_spread,
-    regime_probability,
-)
+from xosc_lateral.workflows.profiles import loop_curves
 from xosc_lateral.workflows.profiles.loop_words import SPREAD, column_label, product_label
 
 # Measured drives, the profile before and the profile after, in every figure of the loop.
-DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
+DRIVES_COLOR, BEFORE_COLOR, AFTER_COLOR = BLUE, MUTED, VERMILLION
 # Samples per segment of a spectrum: 102 s; of that about a cycle, at most: 14 min, or a line would be smeared.
 SPECTRUM_ROWS, CYCLE_ROWS = 512, 4096
 SURROUNDINGS_HZ = 0.07  # To either side of a cycle's line. [Hz]
 TWO_ERRORS = 2.0  # Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]
 FLAT_AXIS = 10.0  # A residual's axis reaches at least so far to both sides, lest noise look large. [mm]
-NEGLIGIBLE = 1e-2  # Share of a column's range that is written as 0. [-]
+ZERO_SHARE = 1e-2  # Share of a column's range that is written as 0. [-]
 PANELS = 4  # Residual panels side by side.
+WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])  # No reader takes the mean of a quantile group for a lane.
 # Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
 GAP_S = 5.0  # Longer gaps in a drive interrupt a line. [s]
@@ -47,32 +39,26 @@ def _three(result: LoopResult) -> tuple[tuple[Mapping[str, FloatArray], str, str
     """Statistics by group of cells, colour and name: measured, and of both profiles."""
     scored = result.scored
     return (
-        (scored.real, DRIVES, "measured"),
-        (scored.before, BEFORE, "profile before"),
-        (scored.after, AFTER, "profile after"),
+        (scored.real, DRIVES_COLOR, "measured"),
+        (scored.before, BEFORE_COLOR, "profile before"),
+        (scored.after, AFTER_COLOR, "profile after"),
     )
 
 
 # ---- columns ----
 def residual_figure(result: LoopResult, what: str) -> Figure:
-    """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
-    names = _shown(result, what)
+    """Measured minus expected by fifths of every column, those of findings first; `what` is "mean" or "spread"."""
+    names = [name for name in result.scored.statistics.labels if f"{what} by {name}" in result.scored.real]
+    acting = {column for finding in result.findings for column in finding.columns}
+    names = sorted(
+        (name for name in names if not name.startswith("effect: ")),
+        key=lambda name: not any(column == name or f"({column})" in name for column in acting),
+    )
     figure = Figure(-(-len(names) // PANELS), PANELS, height=66.0, share_y="all", legend=True)
     for number, (panel, name) in enumerate(zip(figure.panels, names, strict=False)):
         _draw_residual(panel, result, f"{what} by {name}", name)
         panel.y.label = "residual [mm]" if number % PANELS == 0 else ""
     return figure
-
-
-def _shown(result: LoopResult, what: str) -> list[str]:
-    """Columns with a panel, those of the findings first."""
-    names = [
-        name
-        for name in result.scored.statistics.labels
-        if f"{what} by {name}" in result.scored.real and not name.startswith("effect: ")
-    ]
-    acting = {column for finding in result.findings for column in finding.columns}
-    return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))
 
 
 def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> None:
@@ -82,12 +68,12 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     floor = 1000.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
     panel.band(place, -floor, floor, MUTED, opacity=0.2, label="sampling error")
     panel.level(color=MUTED)
-    for values, color, label in ((scored.before, BEFORE, "before"), (scored.after, AFTER, "after")):
+    for values, color, label in ((scored.before, BEFORE_COLOR, "before"), (scored.after, AFTER_COLOR, "after")):
         residual = 1000.0 * (scored.real[group] - values[group])
         panel.line(place, residual, color, label=label)
         panel.dots(place, residual, color)
     # what a smoothed switch decays to is as good as 0
-    shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
+    shown = np.where(np.abs(middles) < ZERO_SHARE * np.nanmax(np.abs(middles)), 0.0, middles)
     if name in WHOLE_NUMBERED:
         shown = np.round(shown)
     last = len(middles) - 1
@@ -96,10 +82,6 @@ def _draw_residual(panel: Panel, result: LoopResult, group: str, name: str) -> N
     ]
     panel.x.limits, panel.y.holds = (-0.3, last + 0.3), (-FLAT_AXIS, FLAT_AXIS)
     panel.title = column_label(name, hint=False)
-
-
-WHOLE_NUMBERED = frozenset(["lane_index", "lane_count"])
-"""Columns whose quantile groups have means that no reader can take for a lane."""
 
 
 def _short(value: float) -> str:
@@ -137,27 +119,27 @@ def _draw_passage(panel: Panel, passage: Passage, column: str) -> None:
     about = TWO_ERRORS * passage.error
     there = coarse_mean(np.nan_to_num((passage.column - np.nan_to_num(passage.usual)) / (passage.high or 1.0)))
     scale = passage.largest_shift[0] / max(float(np.abs(there).max()), 1e-300)
-    panel.line(passage.time, scale * there, BEFORE, label=f"{column} (scaled)")
-    panel.band(passage.time, passage.path - about, passage.path + about, AFTER, opacity=0.2)
-    panel.line(passage.time, passage.path, AFTER)
+    panel.line(passage.time, scale * there, BEFORE_COLOR, label=f"{column} (scaled)")
+    panel.band(passage.time, passage.path - about, passage.path + about, AFTER_COLOR, opacity=0.2)
+    panel.line(passage.time, passage.path, AFTER_COLOR)
     panel.title = "Path in a typical passage"
     panel.x.label, panel.y.label = "time from its beginning [s]", "shift, positive to the left [m]"
 
 
 def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
-    on_mean, curve = effect.acts is Acts.LOCATION, curve_of(result, effect)
+    on_mean, curve = effect.acts is Acts.LOCATION, loop_curves.curve_of(result, effect)
 
     def shown(strength: FloatArray) -> FloatArray:
         return strength if on_mean else np.exp(strength)
 
     about, errors = TWO_ERRORS * curve.error, TWO_ERRORS * curve.measured_error
     low, high = shown(curve.strength - about), shown(curve.strength + about)
-    panel.band(curve.over, low, high, AFTER, opacity=0.2, label="two standard errors")
-    panel.line(curve.over, shown(curve.strength), AFTER, label="fitted effect")
+    panel.band(curve.over, low, high, AFTER_COLOR, opacity=0.2, label="two standard errors")
+    panel.line(curve.over, shown(curve.strength), AFTER_COLOR, label="fitted effect")
     for place, value, error in zip(curve.seen, curve.measured, errors, strict=True):
-        panel.line((place, place), shown(np.array([value - error, value + error])), DRIVES, width=1.0)
+        panel.line((place, place), shown(np.array([value - error, value + error])), DRIVES_COLOR, width=1.0)
     if len(curve.seen):
-        panel.dots(curve.seen, shown(curve.measured), DRIVES, label="measured")
+        panel.dots(curve.seen, shown(curve.measured), DRIVES_COLOR, label="measured")
     panel.title = "The effect"
     panel.x.label = product_label(effect) if isinstance(effect, Product) else column_label(effect.columns[0])
     panel.y.label = "shift, positive to the left [m]" if on_mean else "factor [-]"
@@ -167,7 +149,7 @@ def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
 def traces_figure(result: LoopResult) -> Figure:
     """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
     timeline, scored = result.coarse.timeline, result.scored
-    parts = longest_parts(result)
+    parts = loop_curves.longest_parts(result)
     figure = Figure(len(parts), 3, height=54.0, share_x="all", share_y="all")
     offsets = (timeline.offset, scored.runs_before[0], scored.runs_after[0])
     for number, rows in enumerate(parts):
@@ -196,17 +178,17 @@ def draw_spectra(panel: Panel, result: LoopResult, segment: int, *, within_block
     together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
     segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
     for runs, color, label, dashes in (
-        (timeline.offset[None], DRIVES, "measured (band: two standard errors)", ""),
-        (result.scored.runs_before, BEFORE, "profile before", ""),
-        (result.scored.runs_after, AFTER, "profile after", DASHED),
+        (timeline.offset[None], DRIVES_COLOR, "measured (band: two standard errors)", ""),
+        (result.scored.runs_before, BEFORE_COLOR, "profile before", ""),
+        (result.scored.runs_after, AFTER_COLOR, "profile after", DASHED),
     ):
         frequency, density, number = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
-        if color == DRIVES:
+        if color == DRIVES_COLOR:
             # the mean of so many independent periodograms, which overlap by half
             about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
             inner = slice(1, None)  # frequency 0 has no place on a logarithmic axis
             low, high = density[inner] * np.exp(-about), density[inner] * np.exp(about)
-            panel.band(frequency[inner], low, high, DRIVES, opacity=0.2)
+            panel.band(frequency[inner], low, high, DRIVES_COLOR, opacity=0.2)
         panel.line(frequency[1:], density[1:], color, dashes=dashes, label=label)
     panel.y.log = True
     panel.x.label, panel.y.label = "frequency [Hz]", "power density [m²/Hz]"
@@ -239,35 +221,31 @@ def _time(result: LoopResult, finding: Finding) -> Figure:
     figure = Figure(height=165.0, legend=True)
     (panel,) = figure.panels
     if isinstance(effect, TimeSmooth) and not effect.location:
-        _draw_spread(panel, result, effect, finding.size_m)
+        moving = loop_curves.moving_spread(result, SPREAD_S)
+        curve = effect.path(effect.spread, moving.time)
+        waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
+        error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
+        fitted = float(np.mean(np.log(moving.measured) - curve)) + curve
+        low, high = (np.exp(fitted + sign * TWO_ERRORS * error) for sign in (-1.0, 1.0))
+        panel.band(moving.time, low, high, ORANGE, opacity=0.25)
+        _draw_statistic(panel, moving)
+        panel.line(moving.time, np.exp(fitted), ORANGE, label=f"fitted: factor {finding.size_m:.2f}")
+        panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
         return figure
-    moving = moving_mean(result, MEAN_S)
+    moving = loop_curves.moving_mean(result, MEAN_S)
     _draw_statistic(panel, moving)
     word = "step" if isinstance(effect, Step) else "smooth change"
-    fitted = hidden_mean(result) + moving.measured.mean()
+    fitted = loop_curves.hidden_mean(result) + moving.measured.mean()
     panel.line(moving.time, fitted, ORANGE, width=2.0, label=f"fitted {word}")
     panel.y.label = f"mean over {MEAN_S / 60:.0f} min, positive to the left [m]"
     return figure
 
 
-def _draw_spread(panel: Panel, result: LoopResult, effect: TimeSmooth, factor: float) -> None:
-    moving = moving_spread(result, SPREAD_S)
-    curve = effect.path(effect.spread, moving.time)
-    waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
-    error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
-    middle = float(np.mean(np.log(moving.measured) - curve)) + curve
-    low, high = (np.exp(middle + sign * TWO_ERRORS * error) for sign in (-1.0, 1.0))
-    panel.band(moving.time, low, high, ORANGE, opacity=0.25)
-    _draw_statistic(panel, moving)
-    panel.line(moving.time, np.exp(middle), ORANGE, label=f"fitted: factor {factor:.2f}")
-    panel.y.holds, panel.y.label = (0.0,), f"spread over {SPREAD_S / 60:.0f} min [m]"
-
-
-def _draw_statistic(panel: Panel, moving: MovingStatistic) -> None:
+def _draw_statistic(panel: Panel, moving: loop_curves.MovingStatistic) -> None:
     for values, color, dashes, label in (
-        (moving.measured, DRIVES, "", "measured"),
-        (moving.before, BEFORE, "", "profile before, all runs"),
-        (moving.after, AFTER, DASHED, "profile after, all runs"),
+        (moving.measured, DRIVES_COLOR, "", "measured"),
+        (moving.before, BEFORE_COLOR, "", "profile before, all runs"),
+        (moving.after, AFTER_COLOR, DASHED, "profile after, all runs"),
     ):
         panel.line(moving.time, _gapped(moving, values), color, width=1.2, dashes=dashes, label=label)
     panel.x.label = "time [s]"
@@ -277,11 +255,11 @@ def _regimes(result: LoopResult, finding: Finding) -> Figure:
     """Local spread over time where the regime of large spread is likely, and how often which spread occurs."""
     figure = Figure(1, 2, height=165.0, legend=True)
     over_time, quantiles = figure.panels
-    moving = moving_spread(result, REGIME_S)
+    moving = loop_curves.moving_spread(result, REGIME_S)
     top = 1.05 * float(moving.measured.max())
-    loud = np.where(regime_probability(result) > 0.5, top, np.nan)
+    loud = np.where(loop_curves.regime_probability(result) > 0.5, top, np.nan)
     over_time.band(moving.time, 0.0, loud, ORANGE, opacity=0.3, label="large spread more likely than not")
-    over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES, width=0.8, label="measured")
+    over_time.line(moving.time, _gapped(moving, moving.measured), DRIVES_COLOR, width=0.8, label="measured")
     over_time.y.limits, over_time.y.label = (0.0, top), f"spread within {REGIME_S:.0f} s [m]"
     over_time.x.label = "time [s]"
     _draw_quantiles(quantiles, result)
@@ -304,26 +282,24 @@ def _draw_quantiles(panel: Panel, result: LoopResult) -> None:
     panel.x.label = "share of the time with less spread [%]"
 
 
-def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
+def _gapped(moving: loop_curves.MovingStatistic, values: FloatArray) -> FloatArray:
     """NaN at the first second after a gap, so that no line is drawn across it."""
     return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
 
 
 # By kind of effect, or of finding: what draws it, and the caption.
-DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
-    {
-        Cycle.kind: (
-            _cycle,
-            "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
-        ),
-        TimeSmooth.kind: (_time, "What changes with time, over the drive; orange: the fitted curve."),
-        Regimes.kind: (
-            _regimes,
-            "Left: local spread over the drive; shaded: the regime of large spread is more likely than not. Right: its "
-            "distribution on held-out blocks.",
-        ),
-        Step.kind: (_time, "Mean position over the drive; orange: the fitted step."),
-        "memory": (spectrum_figure, "Power spectral density of the movement, measured and of both profiles."),
-        "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
-    }
-)
+DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = {
+    Cycle.kind: (
+        _cycle,
+        "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
+    ),
+    TimeSmooth.kind: (_time, "What changes with time, over the drive; orange: the fitted curve."),
+    Regimes.kind: (
+        _regimes,
+        "Left: local spread over the drive; shaded: the regime of large spread is more likely than not. Right: its "
+        "distribution on held-out blocks.",
+    ),
+    Step.kind: (_time, "Mean position over the drive; orange: the fitted step."),
+    "memory": (spectrum_figure, "Power spectral density of the movement, measured and of both profiles."),
+    "population": (_population, "Distribution of the local spread of the movement on held-out blocks."),
+}

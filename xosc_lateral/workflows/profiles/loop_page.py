@@ -12,29 +12,9 @@ from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.profiles.loop_figures import (
-    DRAWINGS,
-    effect_figure,
-    residual_figure,
-    spectrum_figure,
-    traces_figure,
-)
+from xosc_lateral.workflows.profiles import loop_figures, loop_words
 from xosc_lateral.workflows.profiles.loop_json import column_record
-from xosc_lateral.workflows.profiles.loop_words import (
-    CERTAIN_P_VALUE,
-    COMPONENT_WORDS,
-    SPREAD,
-    explained_words,
-    feedback_words,
-    group_words,
-    lack_of_fit_words,
-    meaning,
-    others_words,
-    outcome,
-    size_words,
-    taken_back_words,
-)
-from xosc_lateral.workflows.profiles.violins import LABELS, violin_figure
+from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
 LEFT_ROWS = 8  # Rows of the table of what is left.
@@ -46,7 +26,9 @@ def loop_text(result: LoopResult) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
     lines = lines or ["no effect added"]
-    lines += [f"{taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back]
+    lines += [
+        f"{loop_words.taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back
+    ]
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
@@ -54,7 +36,7 @@ def loop_text(result: LoopResult) -> str:
     lines.append(
         f"held-out error {before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
     )
-    lines += [words for words in (explained_words(result), lack_of_fit_words(result)) if words]
+    lines += [words for words in (loop_words.explained_words(result), loop_words.lack_of_fit_words(result)) if words]
     return "\n".join(lines)
 
 
@@ -64,8 +46,8 @@ def finding_sentence(finding: Finding) -> str:
     if finding.lag_s is not None:
         early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
         when = f", {early}, response time {finding.response_s:.1f} s"
-    alike = f"; {others_words(finding)} would explain it about as well" if finding.alike else ""
-    size = "" if finding.kind == "memory" else f", {size_words(finding)}"
+    alike = f"; {loop_words.others_words(finding)} would explain it about as well" if finding.alike else ""
+    size = "" if finding.kind == "memory" else f", {loop_words.size_words(finding)}"
     return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
 
 
@@ -74,7 +56,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     timeline = result.coarse.timeline
     drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
     page = Page(f"Closed loop: {', '.join(drives)}")
-    page.lead(outcome(result))
+    page.lead(loop_words.outcome(result))
     tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
     page.key_figures(
         [
@@ -85,7 +67,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
             ),
         ]
     )
-    page.lead(f"{explained_words(result)} {lack_of_fit_words(result)}".strip())
+    page.lead(f"{loop_words.explained_words(result)} {loop_words.lack_of_fit_words(result)}".strip())
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
@@ -96,7 +78,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
             "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel "
             "is. They are not used as causes."
         )
-        page.table([{"column": item.column, "reason": feedback_words(item)} for item in feedback])
+        page.table([{"column": item.column, "reason": loop_words.feedback_words(item)} for item in feedback])
     else:
         page.text("None.")
     page.section(
@@ -106,7 +88,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     page.table(
         [
             {
-                "component": COMPONENT_WORDS.get(item.component, item.component),
+                "component": loop_words.COMPONENT_WORDS.get(item.component, item.component),
                 "strongest candidate": ", ".join(item.columns) or None,
                 "p-value": item.p_value,
                 "reason": item.why,
@@ -125,7 +107,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     )
     page.section("How to read this page")
     runs = len(result.scored.runs_after)
-    page.items(line.format(n_runs=runs, certain=f"{CERTAIN_P_VALUE:g}") for line in HOW_TO_READ)
+    page.items(line.format(n_runs=runs, certain=f"{loop_words.CERTAIN_P_VALUE:g}") for line in HOW_TO_READ)
     return page.html(
         {
             "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
@@ -159,13 +141,13 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         return
     for finding in result.findings:
         page.heading(_capital(finding.effect))
-        page.text(meaning(finding, result))
+        page.text(loop_words.meaning(finding, result))
         _add_picture(page, result, finding)
     page.heading("All effects in numbers")
     timed = any(finding.lag_s is not None for finding in result.findings)
     page.table(
         [
-            {"effect": finding.effect, "shape": finding.shape, "size": size_words(finding)}
+            {"effect": finding.effect, "shape": finding.shape, "size": loop_words.size_words(finding)}
             | ({"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {})
             | {"p-value": finding.p_value}
             | {"error before [mm]": 1000.0 * finding.error_before, "error after [mm]": 1000.0 * finding.error_after}
@@ -191,11 +173,11 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
 def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
     effect = finding.effects[0] if finding.effects else None
     if not isinstance(effect, ColumnEffect):
-        draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
+        draw, caption = loop_figures.DRAWINGS[effect.kind if effect is not None else finding.kind]
         page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
     elif finding.statistic in result.scored.real:
         page.figure(
-            effect_figure(result, finding),
+            loop_figures.effect_figure(result, finding),
             "Path: where the effect puts the car while its column goes from its usual value to a high one and back. "
             "Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and bands: two "
             "standard errors. Held-out blocks: means by fifths of the effect.",
@@ -211,18 +193,22 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
         "of a lack of fit.",
     )
     page.text("" if result.identified.usable.columns else "The table has no column that varies.")
-    for what, words in (("mean", "mean offset"), ("spread", SPREAD)):
+    for what, words in (("mean", "mean offset"), ("spread", loop_words.SPREAD)):
         if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real):
             page.heading(_capital(words))
             page.figure(
-                residual_figure(result, what),
+                loop_figures.residual_figure(result, what),
                 f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",
                 f"Residual of the {words} by every context column.",
             )
     groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
     page.table(
         [
-            {"group": group_words(group.name, result), "before": 1000.0 * group.before, "after": 1000.0 * group.after}
+            {
+                "group": loop_words.group_words(group.name, result),
+                "before": 1000.0 * group.before,
+                "after": 1000.0 * group.after,
+            }
             | {"between halves": 1000.0 * group.floor, "ratio": group.after / group.floor if group.floor > 0 else None}
             for group in groups
         ],
@@ -236,14 +222,14 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
 def _add_movement(page: Page, result: LoopResult) -> None:
     page.section("Movement")
     page.figure(
-        traces_figure(result),
+        loop_figures.traces_figure(result),
         "Offsets as measured, and one simulated run of the profile before and of the profile after under the same "
         "context, on blocks that neither was fitted to. The curves are not meant to coincide: two drives of the same "
         "driver do not either. What should agree is how they move.",
         "Measured and simulated offsets over time, drive by drive",
     )
     page.figure(
-        spectrum_figure(result),
+        loop_figures.spectrum_figure(result),
         "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement is "
         "like the measured one at that frequency.",
         "Spectra, measured, before and after.",
@@ -255,7 +241,7 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
     page.table(
         [
-            {"metric": LABELS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
+            {"metric": METRIC_WORDS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
             for name in before
         ],
         f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",

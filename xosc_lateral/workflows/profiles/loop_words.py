@@ -8,7 +8,7 @@ import numpy as np
 
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
-from xosc_lateral.drivers.loop.columns import BAND, FUNCTION, Feedback
+from xosc_lateral.drivers.loop.columns import FEEDBACK_BAND_HZ, FUNCTION_COHERENCE, Feedback
 from xosc_lateral.drivers.loop.omnibus import DELAYS
 from xosc_lateral.drivers.loop.passage import Passage
 from xosc_lateral.drivers.loop.selection import Rejected
@@ -185,9 +185,10 @@ def feedback_words(item: Feedback) -> str:
     if item.source:
         by = "declared to be" if item.source == "declared" else "by its name"
         return f"it is {by} the car's own movement"
-    if item.function >= FUNCTION:
+    if item.function >= FUNCTION_COHERENCE:
         return f"it is a function of the present {item.of} (squared coherence {item.function:.2f}), as a warning is"
-    shared = f"above {BAND[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
+    above = f"above {FEEDBACK_BAND_HZ[0]:g}{GAP}Hz, where drivers hardly respond"
+    shared = f"{above}, its squared coherence with the {item.of} is"
     share = f"the movement predicts {100 * item.predicted_share:.1f}{GAP}% of its changes"
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
     declare = f"; if it cannot, declare what it is: `--role {item.column}=road`" if item.doubtful else ""

@@ -1,12 +1,13 @@
-"""`read_profile`, `write_profile`, `list_profiles`, `compare_profiles`: the library of drivers."""
+"""The library of drivers: profiles read, written, listed, compared, derived, tagged, renamed, removed and looked up."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file, output_folder
 from xosc_lateral.workflows.options import declare_options, flag, texts
@@ -22,14 +23,8 @@ if TYPE_CHECKING:
 PROFILE_SUFFIXES = (".json",)
 
 TAGS = flag("--tag", kind=list[str] | None, metavar="TAG", help="Tag to add; may be repeated.")
-
-METADATA = flag(
-    "--set",
-    kind=list[str] | None,
-    read=texts,
-    metavar="FIELD=VALUE",
-    help="Metadata: version, driver, vehicle, road, country, date or licence.",
-)
+METADATA = flag("--set", kind=list[str] | None, read=texts, metavar="FIELD=VALUE",
+    help="Metadata: version, driver, vehicle, road, country, date or licence.")  # fmt: skip
 
 
 @declare_options
@@ -72,15 +67,21 @@ def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -
 
 @declare_options
 def derive_profile(
-    base: ProfileLike = "motorway",
-    *,
+    base: ProfileLike = "motorway", *,
+    preset: Annotated[str | None,
+        flag(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")] = None,
+    sdlp: Annotated[float | None, flag(help="Standard deviation of lateral position. [m]")] = None,
+    mean: Annotated[float | None, flag(help="Mean offset, positive left. [m]")] = None,
+    restlessness: Annotated[float | None, flag(help="Standard deviation of lateral speed. [m/s]")] = None,
+    memory: Annotated[float | None, flag(help="After which the autocorrelation is 1/e. [s]")] = None,
+    near_line: Annotated[float | None,
+        flag(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")] = None,
+    speed: Annotated[float | None, flag(help="At which the figures hold; default 26.4. [m/s]")] = None,
+    vehicle: Annotated[str | None, flag("--class", metavar="truck", help="What the base knows of trucks.")] = None,
     name: Annotated[str, flag(help="Id of the new profile.")] = "",
-    preset: Annotated[
-        str | None, flag(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
-    ] = None,
     library: Paths = (),
-    **asked: float | str | None,
-) -> Derived:
+    **asked: float | None,
+) -> Derived:  # fmt: skip
     """A driver from stated figures: what a profile does, made larger, slower or elsewhere until it has them.
 
     Raises `DriverProfileError`: If figures contradict each other, are too far from the base's, or no car could drive
@@ -93,7 +94,7 @@ def derive_profile(
     name : str
         Id of the new profile; else the preset's or the base's name with ``-derived``.
     **asked
-        Fields of `fitting.derive.Asked`: ``sdlp=0.25``.
+        Other fields of `fitting.derive.Asked`: ``sdlp_change=0.03``.
     """
     from dataclasses import replace
 
@@ -104,7 +105,8 @@ def derive_profile(
 
     known = given_profile(base, library)
     chosen = None if preset is None else preset_called(preset)
-    stated = {key: value for key, value in asked.items() if value is not None}
+    asked |= {"sdlp": sdlp, "mean": mean, "restlessness": restlessness, "memory": memory, "near_line": near_line}
+    stated = {key: value for key, value in {**asked, "speed": speed, "vehicle": vehicle}.items() if value is not None}
     figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
     made = derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
     origin = made.profile.provenance
@@ -127,7 +129,7 @@ def list_profiles(
     from xosc_lateral.files.profiles import matching, read_library
 
     entries = read_library(as_paths(library))
-    return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
+    return ProfileList(tuple(matching(entries, tags, where or {}) if tags or where else entries))
 
 
 @declare_options
@@ -200,13 +202,11 @@ def compare_profiles(*profiles: ProfileLike, library: Paths = (), seed: int = 0)
     return ProfileComparison(compare([given_profile(profile, library) for profile in profiles], seed))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ProfileList(Result):
     """Profiles of a library; those that can't be read among them, with the reason."""
 
-    __slots__ = ("entries",)
-
-    def __init__(self, entries: Sequence[Entry]) -> None:
-        self.entries = tuple(entries)
+    entries: tuple[Entry, ...]
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self.entries)
@@ -240,13 +240,11 @@ class ProfileList(Result):
         return {"profiles": list_record(self.entries)}
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class ProfileComparison(Result):
     """Profiles side by side."""
 
-    __slots__ = ("_compared",)
-
-    def __init__(self, compared: Compared) -> None:
-        self._compared = compared
+    _compared: Compared
 
     def headline(self) -> str:
         """One line."""
@@ -279,3 +277,122 @@ class ProfileComparison(Result):
         from xosc_lateral.workflows.profiles.comparison_page import comparison_page
 
         return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)
+
+
+# ---- Profiles of a library that are removed or get another id, an ----
+@declare_options
+def remove_profiles(names: Sequence[PathLike], library: Paths = ()) -> tuple[Path, ...]:
+    """Delete the files of profiles of your own, all or none; those that can't be read go by their id only.
+
+    Raises `FormatError`: One comes with the package or another, or the file of a path is no profile.
+    """
+    from xosc_lateral.files import profiles
+    from xosc_lateral.files.source import edit_in_place
+
+    paths = [profiles.own_path(str(name), as_paths(library)) for name in names]
+    for name, path in zip(names, paths, strict=True):
+        if str(name) != path.stem:  # a file of any folder
+            profiles.read_profile(path)
+        edit_in_place(path)
+    for path in dict.fromkeys(paths):
+        path.unlink()
+    return tuple(dict.fromkeys(paths))
+
+
+@declare_options
+def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool = False) -> Path:
+    """Give a profile of your own another id, in its file and as the file's name.
+
+    Its hash changes with its id: outputs that used it state the former one. Also for a file that is called other than
+    the id in it.
+
+    Raises `FormatError`: It comes with the package or another, can't be read, or there is a profile of the new id.
+    """
+    from xosc_lateral.files import profiles
+    from xosc_lateral.files.source import edit_in_place
+
+    path = profiles.own_path(str(name), as_paths(library))
+    renamed = profiles.described(profiles.read_profile(path), name=new)
+    output = path.with_name(f"{renamed.name}.json")
+    if output.exists() and not force and not output.samefile(path):
+        raise FormatError("there is a profile of this id; --force replaces it", path=output)
+    edit_in_place(path)
+    profiles.write_profile(renamed, output)
+    if not output.samefile(path):
+        path.unlink()
+    return output
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileUse:
+    """An output with offsets of a profile."""
+
+    output: Path
+    entities: tuple[str, ...]  # that it drives
+    sha256: str  # of the profile as it was then
+    is_current: bool | None  # it is the same now; None: there is no profile of this id any more
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ProfileUses(Result):
+    """Which outputs used a profile."""
+
+    name: str
+    uses: tuple[ProfileUse, ...]
+
+    def headline(self) -> str:
+        """One line."""
+        former = sum(use.is_current is False for use in self.uses)
+        older = f", {former} of them another profile of that id than there is now" if former else ""
+        return f"{len(self.uses)} outputs used {self.name}{older}"
+
+    def __str__(self) -> str:
+        notes = {True: "", False: " (as it was then)", None: " (no longer in the library)"}
+        lines = [f"{use.output}: {', '.join(use.entities)}{notes[use.is_current]}" for use in self.uses]
+        return "\n".join([*lines, self.headline()])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per output."""
+        return pd.DataFrame(self.to_dict()["outputs"], columns=["output", "entities", "sha256", "is_current"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        outputs = [{**asdict(use), "output": str(use.output), "entities": list(use.entities)} for use in self.uses]
+        return {"id": self.name, "outputs": outputs}
+
+
+@declare_options
+def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
+    """Look a profile up in the manifests of batches.
+
+    Raises `FormatError`: A folder without a manifest.
+
+    Parameters
+    ----------
+    name : str
+        Its id; it need not be in the library any more.
+    outputs : path or paths
+        Folders that batches wrote, or their manifests.
+    """
+    from xosc_lateral.files.profiles import profile_hash, read_profile
+    from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
+
+    now: str | None
+    try:
+        now = profile_hash(read_profile(name, as_paths(library)))
+    except DriverProfileError:
+        now = None
+    except (XoscLateralError, OSError):
+        now = ""  # it can't be read: it is none of those that outputs state
+    uses = list[ProfileUse]()
+    for path in as_paths(outputs):
+        manifest = path / MANIFEST if path.is_dir() else path
+        if not manifest.is_file():
+            raise FormatError("no such file: a batch writes it", path=manifest)
+        for row in read_manifest(manifest):
+            entities = tuple(entity for entity, profile in row.profiles.items() if profile == name)
+            if entities:
+                sha256 = row.profile_sha256.get(name, "")
+                is_current = None if now is None else sha256 == now
+                uses.append(ProfileUse(manifest.parent / row.output, entities, sha256, is_current))
+    return ProfileUses(name, tuple(uses))

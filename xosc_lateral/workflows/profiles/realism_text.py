@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.profile import DriverProfile
 
-FAMILIES: Mapping[str, str] = {
+FAMILY_LABELS: Mapping[str, str] = {
     "metrics": "ten metrics",
     "lane_keeping": "lane keeping",
     "spectrum": "spectrum",
@@ -20,7 +19,7 @@ FAMILIES: Mapping[str, str] = {
 }
 """Kinds of difference, for readers."""
 
-AREAS: Mapping[str, str] = {
+AREA_LABELS: Mapping[str, str] = {
     "alone": "classifier AUC",
     "jointly": "classifier AUC, movement and context",
     "floor": "classifier AUC, real drivers",
@@ -36,7 +35,7 @@ INDICATOR_LABELS: Mapping[str, str] = {
     "lateral_jerk": "lateral jerk, rms [m/s³]",
 }
 
-START_FADE = (
+START_FADE_NOTE = (
     "The two-level model fades from the measured start into its own movement within the first second, which raises "
     "diff. std of snippets with the same start slightly."
 )
@@ -45,7 +44,7 @@ START_FADE = (
 
 def start_fade_note(profile: DriverProfile) -> str:
     """What a reader of metrics from the same start has to know about the profile's model; empty: nothing."""
-    return START_FADE if profile.model.kind == ModelKind.TWO_LEVEL else ""
+    return START_FADE_NOTE if profile.model.kind == ModelKind.TWO_LEVEL else ""
 
 
 def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
@@ -62,14 +61,20 @@ def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
 def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     """A row for each family and each classifier, a column for each length."""
     rows: list[dict[str, object]] = []
-    for family, label in FAMILIES.items():
+    for family, label in FAMILY_LABELS.items():
         if any(family in each.families for each in group):
-            cells = {_length(each): _ratio(each, family) for each in group}
+            cells = {
+                _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
+            }
             rows.append({"ratio to real drivers": label, **cells})
-    for key, label in AREAS.items():
+    for key, label in AREA_LABELS.items():
         areas = {_length(each): getattr(each, key) for each in group}
         if any(area is not None for area in areas.values()):
-            rows.append({"ratio to real drivers": label, **{length: _area(area) for length, area in areas.items()}})
+            cells = {
+                length: "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
+                for length, area in areas.items()
+            }
+            rows.append({"ratio to real drivers": label, **cells})
     return rows
 
 
@@ -117,11 +122,3 @@ def realism_lines(realism: Realism) -> list[str]:
 
 def _length(each: ConditionScores) -> str:
     return f"{each.condition.seconds:g} s"
-
-
-def _ratio(each: ConditionScores, family: str) -> str:
-    return f"{each.families[family].ratio:.2f}" if family in each.families else ""
-
-
-def _area(area: TwoSampleResult | None) -> str:
-    return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -64,20 +65,26 @@ def sample(
     if duration is not None:
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
-        unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
-        return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
+        unknown = ", ".join(column for column in driver.columns if column not in {"speed", "lane_width"})
+        return Offsets(
+            driver, made, seed, None, settings, (f"a free run: {unknown} {LEFT_OUT_NOTE}",) if unknown else ()
+        )
     tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
-    warnings = _unknown_columns(driver, tables.drives)
+    drives = tables.drives
     if like is not None:
         with naming(tables):
-            made = list(sample_like(driver, tables.drives, snippet, seed, with_sensor=with_sensor))
-        return Offsets(driver, made, seed, tables, {"snippet_s": snippet}, warnings)
+            made = list(sample_like(driver, drives, snippet, seed, with_sensor=with_sensor))
+    else:
+        made = list(sample_context(driver, drives, seed, with_sensor=with_sensor))
     return Offsets(
-        driver, list(sample_context(driver, tables.drives, seed, with_sensor=with_sensor)), seed, tables, {}, warnings
+        driver, made, seed, tables, {} if like is None else {"snippet_s": snippet}, _unknown_columns(driver, drives)
     )
 
 
-def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]:
+LEFT_OUT_NOTE = "not known, left without effect"
+
+
+def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> tuple[str, ...]:
     """Columns that the profile's effects read and tables lack, in one line for those that the same drives lack.
 
     A column that a table has and that is empty all through a drive is known: there is none (no lane to that side).
@@ -86,36 +93,25 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
     for column in profile.columns:
         names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
         lacking.setdefault(names, []).append(column)
-    return [
-        _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
+    return tuple(
+        f"{f'drive {names[0]}' if len(names) == 1 else f'{len(names)} of {len(drives)} drives'}: "
+        f"{', '.join(columns)} {LEFT_OUT_NOTE}"
         for names, columns in lacking.items()
         if names
-    ]
+    )
 
 
-def _neutral(where: str, columns: Sequence[str]) -> str:
-    return f"{where}: {', '.join(columns)} not known, left without effect"
-
-
+@dataclass(frozen=True, eq=False, repr=False)
 class Offsets(Result):
     """Sampled offsets."""
 
-    __slots__ = ("_given", "_made", "_settings", "profile", "seed", "warnings")
-
-    def __init__(
-        self,
-        profile: DriverProfile,
-        made: Sequence[SampledOffsets],
-        seed: int,
-        tables: GivenDrives | None,
-        settings: dict[str, Any],
-        warnings: Sequence[str],
-    ) -> None:
-        self._made, self._given, self._settings = made, tables, settings
-        self.profile = profile
-        self.seed = seed
-        self.warnings = tuple(warnings)
-        """What a user has to know, a line each."""
+    profile: DriverProfile
+    _made: Sequence[SampledOffsets]
+    seed: int
+    _tables: GivenDrives | None
+    _settings: dict[str, Any]
+    warnings: tuple[str, ...]
+    """What a user has to know, a line each."""
 
     def __len__(self) -> int:
         return sum(len(each.time) for each in self._made)
@@ -183,7 +179,7 @@ class Offsets(Result):
         from xosc_lateral.files.output_tables import output_suffixes, write_frame
 
         output = output_file(path, f"{self.profile.name}.csv", output_suffixes())
-        claim([output], () if self._given is None else self._given.files, force=force)
+        claim([output], () if self._tables is None else self._tables.files, force=force)
         write_frame(self.to_frame(), output, self._provenance())
         return output
 
@@ -194,6 +190,6 @@ class Offsets(Result):
             "seed": self.seed,
             "profile": self.profile.name,
             "profile_sha256": profile_hash(self.profile),
-            "inputs": {} if self._given is None else dict(self._given.inputs),
+            "inputs": {} if self._tables is None else dict(self._tables.inputs),
             **self._settings,
         }

@@ -9,7 +9,7 @@ from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.files.pages.chart import DASHED, MEASURED, MUTED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 
-LABELS = {
+METRIC_WORDS = {
     "max": "maximum",
     "min": "minimum",
     "mean": "mean",
@@ -47,7 +47,7 @@ def violin_figure(
                 panel.line((0.0, side * reach), (bar, bar), color, width=1.6)
         if before is not None:
             panel.line(*_half(before[:, k], 1.0), MUTED, width=1.0, dashes=DASHED, label=f"{names[1]} before")
-        panel.title, panel.x.limits, panel.x.ticks = LABELS[name], (-1.15, 1.15), []
+        panel.title, panel.x.limits, panel.x.ticks = METRIC_WORDS[name], (-1.15, 1.15), []
         panel.y.label = "[m]" if k % 5 == 0 else ""
     return figure
 

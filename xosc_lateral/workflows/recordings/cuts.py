@@ -19,7 +19,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RUN
-from xosc_lateral.drivers.drives.cuts import MAX_GAP
+from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.world.road.network import RoadNetwork
 
 RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.drivers.drives.cuts import MAX_GAP
+from xosc_lateral.drivers.drives.drive import MAX_GAP
 
 
 @dataclass(frozen=True, eq=False)

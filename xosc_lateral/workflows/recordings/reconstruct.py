@@ -68,7 +68,7 @@ def reconstruct(
     force : bool
         Replace files that this package did not write.
     options
-        `recordings.settings.ReconstructSettings`: which part and which vehicles, and what is written of them.
+        `ReconstructSettings`.
 
     Raises
     ------

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
-from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
+from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
@@ -253,7 +253,7 @@ def dlr_road(lanes: dlr_ht.Carriageways) -> WrittenRoad:
     line = lanes.reference
     middle = line.place(np.array([0.5 * line.length]), 0)[0]
     origin = float(np.round(middle[0])), float(np.round(middle[1]))
-    s = np.linspace(0.0, line.length, max(2, round(line.length / WIDTH_PIECE)) + 1)
+    s = np.linspace(0.0, line.length, max(2, round(line.length / WIDTH_PIECE_LENGTH)) + 1)
     sides = []
     for name in ("southbound", "northbound"):
         along = s if name == "northbound" else line.length - s

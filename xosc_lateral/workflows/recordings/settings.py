@@ -19,19 +19,15 @@ def _version(text: str) -> str:
     return text
 
 
+@say.documented
 @dataclass(frozen=True, slots=True)
 class ReconstructSettings:
     """What is reconstructed, and how: keywords of `reconstruct`, and the options of the command line.
 
-    `format`: "dlr-ht", "levelx", "osi", "commonroad", "fcd" or "tracks"; by default told from the file. `road`: of
-    recordings that come without their lanes. `begin`, `end`: part of the recording. [s] `vehicles`: these alone.
-    `around`, `window`: a vehicle and those who come near it, for so long in the middle of its passage. [s] `host`:
-    the vehicle under test, which `convert` leaves to the system that drives it; by default the recording's own,
-    "none": there is none. `error`: positions along the road are within this; smaller: more corners in the speeds.
-    [m] `version`: of OpenSCENARIO, "1.0" to "1.3". `relative`: lane changes and braking begin at a distance to
-    another vehicle, where the recording bears it out. `exact`: recorded paths as trajectories, instead of
-    maneuvers. `fit`: a driver profile of its own for every vehicle that drove long enough. `library`: folders with
-    further profiles to choose from.
+    Parameters
+    ----------
+    relative : bool
+        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
     """
 
     # fmt: off

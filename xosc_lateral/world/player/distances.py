@@ -2,6 +2,11 @@
 
 All signed: positive ahead, or to the left. The reference direction is that of the road at the entity, turned the way
 that the entity points; without a road, the entity's own heading (as in the reference player).
+
+References
+----------
+.. [1] C. Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2 (point and line segment) and 5.2.1
+       (separating axes).
 """
 
 from __future__ import annotations
@@ -12,10 +17,10 @@ from math import copysign, cos, hypot, inf, sin
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.world.player import boxes
 from xosc_lateral.world.player.drive import drawn_by
 from xosc_lateral.world.player.paths.base import nearest_s
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
+from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.lanes import lanes_between
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadPath
@@ -39,16 +44,13 @@ class Spot(Struct, frozen=True):
 
 
 class RoadGap(Struct, frozen=True):
-    """From one place to another along the roads, seen there.
+    """From one place to another along the roads, seen there."""
 
-    [m], lanes (positive to +t, lane 0 not counted), whether on the other side of lane 0, whether s runs the other way.
-    """
-
-    ds: float
-    dt: float
-    lanes: int
-    opposite: bool
-    is_turned: bool = False
+    ds: float  # [m]
+    dt: float  # [m]
+    lanes: int  # positive to +t, lane 0 not counted
+    opposite: bool  # on the other side of lane 0
+    is_turned: bool = False  # s runs the other way
 
 
 def ahead_and_left(state: EntityState, x: float, y: float) -> tuple[float, float]:
@@ -92,12 +94,12 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNRE
     A box may lie in two lanes, and the standard does not say which counts: the corner as in the reference player,
     where boxes that touch are in the same lane.
     """
-    if boxes.overlap(state, other):
+    if overlap(state, other):
         return RoadGap(0.0, 0.0, 0, opposite=False)
     ds = Measure(CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True).to_entity(state, other)
     if ds is None:
         return None
-    ours, theirs = (_project(state, *boxes.corners(one)[-1]) for one in (state, other))
+    ours, theirs = (_project(state, *corners(one)[-1]) for one in (state, other))
     gap = _gap_between(state, ours, theirs, limit)
     return gap and replace(gap, ds=ds)
 
@@ -167,10 +169,10 @@ class Measure(Struct, frozen=True):
             pose = other.plane
             return self.to_spot(state, Spot(pose.x, pose.y))
         if not self.is_along_roads:
-            return self._between_boxes(state, boxes.corners(other), lambda: boxes.overlap(state, other))
-        if boxes.overlap(state, other):
+            return self._between_boxes(state, corners(other), lambda: overlap(state, other))
+        if overlap(state, other):
             return 0.0
-        return self._between_corners(state, [_project(state, x, y) for x, y in boxes.corners(other)])
+        return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
         """From an entity to a spot. [m]"""
@@ -178,7 +180,7 @@ class Measure(Struct, frozen=True):
             if self.is_along_roads:
                 return self._between_corners(state, [spot])
             point = spot.x, spot.y
-            return self._between_boxes(state, (point,), lambda: boxes.holds_point(boxes.corners(state), point))
+            return self._between_boxes(state, (point,), lambda: holds_point(corners(state), point))
         if self.kind is RelativeDistanceType.EUCLIDIAN:
             return straight_distance(state, spot.x, spot.y)
         lateral = self.kind is RelativeDistanceType.LATERAL
@@ -196,21 +198,21 @@ class Measure(Struct, frozen=True):
             return None
         return gap.dt if lateral else gap.ds
 
-    def _between_boxes(self, state: EntityState, shape: tuple[boxes.Point, ...], touches: Callable[[], bool]) -> float:
+    def _between_boxes(self, state: EntityState, shape: tuple[Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
-        ours, along_own = boxes.corners(state), -state.plane.heading
+        ours, along_own = corners(state), -state.plane.heading
         if self.kind is RelativeDistanceType.EUCLIDIAN:
-            ahead, _ = boxes.gaps(ours, shape, along_own)
-            return 0.0 if touches() else copysign(boxes.distance_between(ours, shape), ahead or 1.0)
+            ahead, _ = box_gaps(ours, shape, along_own)
+            return 0.0 if touches() else copysign(distance_between(ours, shape), ahead or 1.0)
         in_world = self.system is CoordinateSystem.WORLD
-        along, across = boxes.gaps(ours, shape, state.network.header_offset.heading if in_world else along_own)
+        along, across = box_gaps(ours, shape, state.network.header_offset.heading if in_world else along_own)
         return across if self.kind is RelativeDistanceType.LATERAL else along
 
     def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
         """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
         state.locate()
         values = []
-        for place in (_project(state, x, y) for x, y in boxes.corners(state)):
+        for place in (_project(state, x, y) for x, y in corners(state)):
             for spot in spots:
                 path = _path_between(state, place, spot)
                 if path is None:
@@ -256,3 +258,76 @@ def _lane_there(network: RoadNetwork, here: Spot, path: RoadPath) -> int:
             return -here.lane if path.is_turned else here.lane
         road, lane, way = entered, there[0], entry
     return lane
+
+
+# ---- bounding boxes in the plane: overlap, and gaps between them [m] ----
+Point = tuple[float, float]
+
+HEIGHT_APART = 2.5
+"""Entities further apart than this in z are on different levels of the road: they don't touch. [m]"""
+
+
+def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
+    """Corners of an entity's box, counter-clockwise from front left."""
+    box, pose = state.entity.bounding_box, state.plane
+    c, s = cos(pose.heading), sin(pose.heading)
+    front, rear = box.center_x + 0.5 * box.length, box.center_x - 0.5 * box.length
+    left, right = box.center_y + 0.5 * box.width, box.center_y - 0.5 * box.width
+
+    def world(x: float, y: float) -> Point:
+        return pose.x + x * c - y * s, pose.y + x * s + y * c
+
+    return world(front, left), world(rear, left), world(rear, right), world(front, right)
+
+
+def axis_gap(corners_: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> float:
+    """Signed gap from `corners_` to `other` along an axis; 0 where their shadows overlap."""
+    mine = [x * axis[0] + y * axis[1] for x, y in corners_]
+    theirs = [x * axis[0] + y * axis[1] for x, y in other]
+    if max(mine) < min(theirs) - EPSILON:
+        return min(theirs) - max(mine)
+    if min(mine) > max(theirs) + EPSILON:
+        return max(theirs) - min(mine)
+    return 0.0
+
+
+def overlap(a: EntityState, b: EntityState) -> bool:
+    """Whether the boxes touch (separating axes), on the same level."""
+    pa, pb = a.plane, b.plane
+    box_a, box_b = a.entity.bounding_box, b.entity.bounding_box
+    reach = hypot(box_a.length + box_b.length, box_a.width + box_b.width)
+    if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
+        return False
+    first, other = corners(a), corners(b)
+    return not any(any(box_gaps(first, other, -heading)) for heading in (pa.heading, pb.heading))
+
+
+def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
+    """Shortest distance between the outlines of two convex shapes that don't overlap; either may be a point."""
+    best = inf
+    for points, outline in ((a, b), (b, a)):
+        edges = list(zip(outline, outline[1:] + outline[:1], strict=True))
+        for point in points:
+            for start, end in edges:
+                ux, uy = end[0] - start[0], end[1] - start[1]
+                length = ux * ux + uy * uy
+                u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
+                u = min(max(u, 0.0), 1.0)
+                best = min(best, hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy))
+    return best
+
+
+def holds_point(box: tuple[Point, ...], point: Point) -> bool:
+    """Whether a point is inside a box given by its corners."""
+    (ax, ay), (bx, by), _, (dx, dy) = box
+    for ux, uy in ((bx - ax, by - ay), (dx - ax, dy - ay)):
+        along = (point[0] - ax) * ux + (point[1] - ay) * uy
+        if not 0.0 <= along <= ux * ux + uy * uy:
+            return False
+    return True
+
+
+def box_gaps(shape_: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
+    """Gap from `shape_` to a shape along the axes of a frame turned back by `turn` [rad]; 0 where they overlap."""
+    c, s = cos(turn), sin(turn)
+    return axis_gap(shape_, shape, (c, -s)), axis_gap(shape_, shape, (s, c))

@@ -9,7 +9,7 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import LaneLink, wrap
 
-_TIGHT = 1e-3
+_LEAST_SHRINK = 1e-3
 """Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
 
 
@@ -62,7 +62,7 @@ def beside_line(curvature: float, t: float, distance: float) -> float:
     if abs(curvature) < EPSILON:
         return distance
     shrink = 1.0 - curvature * t
-    return distance / shrink if shrink > _TIGHT else distance
+    return distance / shrink if shrink > _LEAST_SHRINK else distance
 
 
 def travel(state: EntityState, way: int, distance: float) -> None:

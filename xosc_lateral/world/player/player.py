@@ -33,7 +33,7 @@ _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times a
 LEAST_PUT_AWAY = 2048
 """Frames after which rows are put away at the earliest: fewer in each piece would make too many of them."""
 
-STANDING = 1e-3
+STANDING_SPEED = 1e-3
 """Below this speed an entity stands. [m/s]"""
 
 
@@ -158,7 +158,7 @@ class _Player:
     def _derive_states(self) -> None:
         simulation = self.simulation
         for state in simulation.unwatched.awake:
-            standing = -STANDING < state.speed < STANDING
+            standing = -STANDING_SPEED < state.speed < STANDING_SPEED
             state.standing_since = _since(state.standing_since, standing, simulation.time)
             state.road_end_since = _since(state.road_end_since, state.at_road_end, simulation.time)
             if simulation.derives_off_road:

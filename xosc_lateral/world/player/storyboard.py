@@ -26,18 +26,14 @@ Watcher = Callable[[State, State | None], None]
 
 @dataclass(eq=False)
 class StoryboardElement:
-    """One element of the tree.
-
-    `kind`: none for the storyboard; `maximum_count`: how often it may run; None for elements that run once and cannot
-    be run again by themselves.
-    """
+    """One element of the tree."""
 
     name: str
-    kind: StoryboardElementType | None
+    kind: StoryboardElementType | None  # none for the storyboard
     children: Sequence[StoryboardElement] = ()
     start_trigger: RunningTrigger | None = None
     stop_trigger: RunningTrigger | None = None
-    maximum_count: int | None = None
+    maximum_count: int | None = None  # of runs; None: once, and never again by itself
     state: State | None = field(default=None, init=False)
     """None: its parent has not started it."""
     count: int = field(default=0, init=False)
@@ -184,15 +180,12 @@ class EventElement(StoryboardElement):
 
     def make_room(self) -> bool:
         """By the priority among the events of the maneuver."""
-        if self.priority not in (Priority.SKIP, Priority.OVERRIDE):
-            return True
         siblings = () if self.parent is None else self.parent.children
         running = [event for event in siblings if event is not self and event.is_running]
         if self.priority is Priority.SKIP:
             return not running
-        if self.priority is Priority.OVERRIDE:
-            for event in running:
-                event.end()
+        for event in running if self.priority is Priority.OVERRIDE else ():
+            event.end()
         return True
 
 

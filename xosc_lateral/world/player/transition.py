@@ -24,15 +24,11 @@ _PEAK_SLOPE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShap
 
 @dataclass(slots=True)
 class Transition:
-    """A transition under way.
-
-    `dimension`: what the parameter is: seconds (`time`, `rate`) or metres (`distance`); `parameter_range`: its range (a
-    step has none), or peak slope for `rate` (its sign does not matter).
-    """
+    """A transition under way."""
 
     shape: DynamicsShape
-    dimension: DynamicsDimension
-    parameter_range: InitVar[float]
+    dimension: DynamicsDimension  # of the parameter: seconds (`time`, `rate`) or metres (`distance`)
+    parameter_range: InitVar[float]  # a step has none; for `rate` the peak slope, whose sign does not matter
     start: float = 0.0
     target: float = 0.0
     parameter: float = 0.0
@@ -63,7 +59,11 @@ class Transition:
         """Set the target, keeping the parameter (targets that move)."""
         self.target = target
         if self.dimension is DynamicsDimension.RATE:
-            self.range = max(self._range_for(abs(target - self.start), self.peak_rate), EPSILON)
+            change, peak = abs(target - self.start), self.peak_rate
+            if self.shape is DynamicsShape.STEP or change == peak == 0.0:
+                self.range = EPSILON
+            else:
+                self.range = max(_PEAK_SLOPE[self.shape] * change / peak, EPSILON) if peak else inf
 
     def limit_slope(self, limit: float) -> None:
         """Stretch the transition so that its slope stays under `limit` (per second, sign ignored)."""
@@ -136,8 +136,3 @@ class Transition:
     def advance(self, delta: float) -> None:
         """Move the parameter by `delta` (divided by the stretch), staying within 0 and the range."""
         self.parameter = min(max(self.parameter + delta / self.scale, 0.0), self.range)
-
-    def _range_for(self, change: float, peak: float) -> float:
-        if self.shape is DynamicsShape.STEP:
-            return 0.0
-        return inf if peak == 0.0 and change > 0.0 else _PEAK_SLOPE[self.shape] * change / peak if peak else 0.0

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
-from xosc_lateral.world.road.lane_tables import CHUNK
+from xosc_lateral.world.road.lane_tables import CHUNK_SIZE
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.positions import LanePositions
-from xosc_lateral.world.road.road import CONVERGED_STEP, ITERATIONS, MAX_STEP, Road
+from xosc_lateral.world.road.road import CONVERGED_STEP, MAX_STEP, MOST_ITERATIONS, Road
 from xosc_lateral.world.road.samples import Candidates, Samples
 from xosc_lateral.world.road.tables import NetworkTables
 
-WRONG_WAY = 2.0
+WRONG_WAY_DISTANCE = 2.0
 """A lane driven the opposite way counts as this much further off when the heading is known. [m]"""
 
-SAME_LEVEL = 1.0
+SAME_LEVEL_HEIGHT = 1.0
 """Height differences below this mean nothing when z is known. [m]"""
 
 LANE_TOLERANCE = 1e-6
@@ -119,10 +119,10 @@ class SurfaceIndex(NetworkTables):
         score = outside
         if z is not None:
             above = np.abs(z[point] - self._height(road, feet.s, feet.t))
-            score = score + np.maximum(above - SAME_LEVEL, 0.0)
+            score = score + np.maximum(above - SAME_LEVEL_HEIGHT, 0.0)
         if heading is not None:
             lane_heading = feet.heading + np.where(direction < 0, np.pi, 0.0)
-            score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading[point] - lane_heading))
+            score = score + 0.5 * WRONG_WAY_DISTANCE * (1.0 - np.cos(heading[point] - lane_heading))
         lane = np.where(row < 0, 0, self._lane_ids[row])
         offset = direction * (feet.t - centre)
         best.offer(point, score, away, LanePositions(road, lane, feet.s, offset, feet.t, outside))
@@ -160,7 +160,7 @@ class SurfaceIndex(NetworkTables):
         """Feet on the given roads, from guesses of s; arrays of one length. Shape (n,). [m]"""
         parts = [
             self._project_chunk(road[part], x[part], y[part], guess[part])
-            for part in (slice(begin, begin + CHUNK) for begin in range(0, len(x), CHUNK))
+            for part in (slice(begin, begin + CHUNK_SIZE) for begin in range(0, len(x), CHUNK_SIZE))
         ]
         if not parts:
             return _Feet(*(np.empty(0) for _ in _Feet._fields))
@@ -171,7 +171,7 @@ class SurfaceIndex(NetworkTables):
         s = np.minimum(np.maximum(guess, 0.0), length)
         low, high = np.full(len(x), -1.0), length + 1.0  # beyond the ends: nothing is known yet
         active = np.arange(len(x))
-        for _ in range(ITERATIONS):
+        for _ in range(MOST_ITERATIONS):
             at = s[active]
             frame = self._lines.at(road[active], at, derivatives=True)
             dx, dy = x[active] - frame.x, y[active] - frame.y

@@ -18,7 +18,7 @@ from xosc_lateral.world.road.lanes import DRIVING, MINIMUM_LANE_WIDTH, Lane
 from xosc_lateral.world.road.piecewise import IndexLike, Lookup
 from xosc_lateral.world.road.road import Road, find_lane, limit_at
 
-CHUNK = 8192
+CHUNK_SIZE = 8192
 """Places evaluated together: the two dozen temporary arrays of a chunk then stay in the processor's cache."""
 
 
@@ -183,8 +183,8 @@ class LaneTables:
         indices = [_one_or_many(a, shape) for a in extra]
         size = len(flat[0])
         whole = [np.empty(size) for _ in range(outputs)]
-        for begin in range(0, size, CHUNK):
-            part = slice(begin, begin + CHUNK)
+        for begin in range(0, size, CHUNK_SIZE):
+            part = slice(begin, begin + CHUNK_SIZE)
             cut = [a if isinstance(a, int) else a[part] for a in indices]
             results = evaluate(
                 road_ if isinstance(road_, int) else road_[part], flat[0][part], *cut, *(a[part] for a in flat[1:])

@@ -108,11 +108,9 @@ class Links:
         """Contact point that a file leaves out: the end of the other road that is nearer."""
         here, there = self.roads[road], self.roads[other]
         x, y, _ = here.reference_at(here.length if direction > 0 else 0.0)
-        gaps = []
-        for s in (0.0, there.length):
-            u, v, _ = there.reference_at(s)
-            gaps.append((u - x) ** 2 + (v - y) ** 2)
-        return "start" if gaps[0] <= gaps[1] else "end"
+        ends = (there.reference_at(s) for s in (0.0, there.length))
+        to_start, to_end = ((u - x) ** 2 + (v - y) ** 2 for u, v, _ in ends)
+        return "start" if to_start <= to_end else "end"
 
     def _enter(self, road: int, lane: int, contact: str) -> LaneLink:
         return LaneLink(road, lane, *((0.0, 1) if contact == "start" else (self.roads[road].length, -1)))

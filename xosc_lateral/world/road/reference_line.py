@@ -63,7 +63,6 @@ class ReferenceLines:
         self._origin = np.array([origin for origin, _, _ in pieces])
         self._is_cubic = np.array([is_cubic for _, is_cubic, _ in pieces])
         self._row = np.array([row for _, _, row in pieces], dtype=np.intp)
-        self._any_cubic, self._all_cubic = bool(self._is_cubic.any()), bool(self._is_cubic.all())
         self._clothoid = np.array([(p.heading, p.curvature, p.sharpness) for p in clothoids]).reshape(-1, 3).T.copy()
         self._x_series = np.array([p.x_series for p in clothoids]).reshape(-1, SERIES_TERMS + 1).T.copy()
         self._y_series = np.array([p.y_series for p in clothoids]).reshape(-1, SERIES_TERMS + 1).T.copy()
@@ -77,13 +76,9 @@ class ReferenceLines:
         piece = self._lookup.find(road, s)
         ds = s - self._origin[piece]
         row = self._row[piece]
-        if isinstance(piece, int) or not self._any_cubic or self._all_cubic:
-            cubic = bool(self._is_cubic[piece]) if isinstance(piece, int) else self._all_cubic
-            return (self._cubic_frame if cubic else self._clothoid_frame)(row, ds, derivatives)
         is_cubic = self._is_cubic[piece]
-        count = int(np.count_nonzero(is_cubic))
-        if count in (0, len(s)):
-            return (self._cubic_frame if count else self._clothoid_frame)(row, ds, derivatives)
+        if isinstance(piece, int) or is_cubic.all() or not is_cubic.any():
+            return (self._cubic_frame if np.any(is_cubic) else self._clothoid_frame)(row, ds, derivatives)
         return self._mixed(row, ds, is_cubic, derivatives)
 
     def _mixed(self, row: NDArray[np.intp], ds: FloatArray, is_cubic: NDArray[np.bool_], derivatives: bool) -> Frame:

@@ -238,7 +238,7 @@ def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
 
 
 # ---- from x, y to s, t: the foot of the perpendicular on the reference line ----
-ITERATIONS = 40
+MOST_ITERATIONS = 40
 """Newton takes 3-6; bisection, where the reference line has a corner, 40 for 1e-11 m."""
 
 MAX_STEP = 25.0
@@ -254,7 +254,7 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     s = min(max(guess, 0.0), length)
     low, high = -1.0, length + 1.0
     leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         line_x, line_y, heading = road.reference_at(s)
         dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
         ahead, across = dx * c + dy * d, dy * c - dx * d

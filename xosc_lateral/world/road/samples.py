@@ -18,13 +18,13 @@ from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.lanes import Lane, LaneSection
 from xosc_lateral.world.road.tables import NetworkTables
 
-SPACING = 8.0
+SAMPLE_SPACING = 8.0
 """Distance of the samples laid over the lanes. [m]"""
 
-SAMPLE_REACH = 0.5 * float(np.hypot(SPACING, SPACING)) + 1.0
+SAMPLE_REACH = 0.5 * float(np.hypot(SAMPLE_SPACING, SAMPLE_SPACING)) + 1.0
 """No place on a lane is further from its nearest sample (1 m for what curves bulge between samples). [m]"""
 
-CELL = 2.0 * SPACING
+CELL_SIZE = 2.0 * SAMPLE_SPACING
 """Size of the grid's cells; a point looks for samples in its own cell and the eight around it. [m]"""
 
 BRUTE_FORCE = 4_000_000
@@ -59,8 +59,8 @@ class Samples:
         # The pieces of a road that pass a cell apart from each other (a loop, a hairpin) are separate candidates.
         self.piece = np.concatenate(
             [np.full(len(part[1]), k, dtype=np.int64) for k, part in enumerate(parts)]
-        ) * 1_000_000 + (self.s // (4.0 * CELL)).astype(np.int64)
-        self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
+        ) * 1_000_000 + (self.s // (4.0 * CELL_SIZE)).astype(np.int64)
+        self._x0, self._y0 = float(self.x.min()) - CELL_SIZE, float(self.y.min()) - CELL_SIZE
         column, line = self._cell(self.x, self.y)
         self._lines = int(line.max()) + 2
         around = [(across, along) for across in (-1, 0, 1) for along in (-1, 0, 1)]
@@ -72,7 +72,7 @@ class Samples:
         self._first = np.append(first, len(order))
 
     def _cell(self, x: FloatArray, y: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
+        return ((x - self._x0) // CELL_SIZE).astype(np.int64), ((y - self._y0) // CELL_SIZE).astype(np.int64)
 
     def near_pieces(self, x: FloatArray, y: FloatArray) -> Candidates:
         """Every piece of road that may be the nearest one, once per point, at least one; `x`, `y` of shape (n,). [m]"""
@@ -138,13 +138,13 @@ def _grid(
     tables: NetworkTables, index: int, section: LaneSection, lanes: Sequence[Lane]
 ) -> tuple[FloatArray, FloatArray]:
     """s and t over the lanes of a section, shape (m, n) each. [m]"""
-    n = int(np.ceil((section.end - section.start) / SPACING)) + 1
+    n = int(np.ceil((section.end - section.start) / SAMPLE_SPACING)) + 1
     s = np.linspace(section.start, section.end, n)
     inside = np.minimum(s, np.nextafter(section.end, -np.inf))
     left = tables.lane_profile(index, lanes[0].id, inside)
     right = tables.lane_profile(index, lanes[-1].id, inside)
     top, bottom = left.centre + 0.5 * left.width, right.centre - 0.5 * right.width
-    m = int(np.ceil(max(float((top - bottom).max()), 0.0) / SPACING)) + 1
+    m = int(np.ceil(max(float((top - bottom).max()), 0.0) / SAMPLE_SPACING)) + 1
     t = bottom + (top - bottom) * (np.linspace(0.0, 1.0, m)[:, None] if m > 1 else 0.5)
     t = np.broadcast_to(t, (m, n))
     return np.broadcast_to(s, (m, n)), t

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
 
-BEND_STEP = 1e-3
+GRADE_STEP = 1e-3
 """Step of differences of the grade. [m]"""
 
 
@@ -92,8 +92,8 @@ class Surface(Struct, frozen=True):
         """Change of the grade along s: the slope is a parabola, whose central difference is exact. [1/m]"""
         if self.elevation.is_zero:
             return 0.0
-        ahead, behind = (self.elevation.with_slope_at(s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
-        return (ahead - behind) / (2.0 * BEND_STEP)
+        ahead, behind = (self.elevation.with_slope_at(s + ds)[1] for ds in (GRADE_STEP, -GRADE_STEP))
+        return (ahead - behind) / (2.0 * GRADE_STEP)
 
     def lead_at(self, s: float, across: float) -> float:
         """How far along s a place lies from the foot of its s, `across` the line seen from above. [m]"""
@@ -143,10 +143,10 @@ class HeaderOffset(Struct, frozen=True):
 
     def undo(self, x: Place, y: Place) -> tuple[Place, Place]:
         """Coordinates of the file of an inertial place, or of several. [m]"""
-        c, s = cos(self.heading), sin(self.heading)
-        return c * x + s * y - self.x, c * y - s * x - self.y
+        x, y = self.turned_back(x, y)
+        return x - self.x, y - self.y
 
-    def turned_back(self, dx: float, dy: float) -> tuple[float, float]:
+    def turned_back(self, dx: Place, dy: Place) -> tuple[Place, Place]:
         """An inertial direction along the axes of the file. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * dx + s * dy, c * dy - s * dx

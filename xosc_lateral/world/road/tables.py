@@ -23,7 +23,7 @@ from xosc_lateral.world.road.piecewise import IndexLike, Lookup, PiecewiseCubic
 from xosc_lateral.world.road.positions import Poses
 from xosc_lateral.world.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.world.road.road import Road
-from xosc_lateral.world.road.surface import BEND_STEP
+from xosc_lateral.world.road.surface import GRADE_STEP
 
 
 class Cubics:
@@ -194,8 +194,8 @@ class NetworkTables(LaneTables):
         lift, lift_along, lean = self._shaped(road, s, t)
         if not angles:
             return height + lift, nothing, nothing, shrink, None, lead
-        ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
-        bend = (ahead - behind) / (2.0 * BEND_STEP) * level * level
+        ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (GRADE_STEP, -GRADE_STEP))
+        bend = (ahead - behind) / (2.0 * GRADE_STEP) * level * level
         onward = 1.0 - t * (shrink * twist * steep + rise * level * bend)
         climb = grade + t * (shrink * twist * level - rise * steep * bend)
         drift = -t * rise * twist / onward

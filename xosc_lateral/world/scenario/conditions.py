@@ -7,18 +7,7 @@ from typing import Annotated
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario.enums import (
-    AngleType,
-    ConditionEdge,
-    CoordinateSystem,
-    DirectionalDimension,
-    EntityCategory,
-    RelativeDistanceType,
-    RoutingAlgorithm,
-    Rule,
-    StoryboardElementState,
-    StoryboardElementType,
-)
+from xosc_lateral.world.scenario import enums
 from xosc_lateral.world.scenario.place import (
     AnyNumber,
     Content,
@@ -41,7 +30,7 @@ class ParameterCondition(Content, frozen=True):
 
     parameter_ref: ParameterRef
     value: str
-    rule: Rule
+    rule: enums.Rule
 
 
 class VariableCondition(Content, frozen=True):
@@ -49,35 +38,35 @@ class VariableCondition(Content, frozen=True):
 
     variable_ref: ParameterRef
     value: str
-    rule: Rule
+    rule: enums.Rule
 
 
 class SimulationTimeCondition(Content, frozen=True):
     """[s]"""
 
     value: AnyNumber
-    rule: Rule
+    rule: enums.Rule
 
 
 def at_time(moment: float, name: str, place: Place) -> Trigger:
     """Trigger of our own that holds from a moment on. [s]"""
-    content = SimulationTimeCondition(moment, Rule.GREATER_THAN, place=place)
-    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, content, None, place),)),), place)
+    content = SimulationTimeCondition(moment, enums.Rule.GREATER_THAN, place=place)
+    return Trigger((ConditionGroup((Condition(name, 0.0, enums.ConditionEdge.NONE, content, None, place),)),), place)
 
 
 class TimeOfDayCondition(Content, frozen=True):
     """Against the environment's clock."""
 
     date_time: datetime
-    rule: Rule
+    rule: enums.Rule
 
 
 class StoryboardElementStateCondition(Content, frozen=True):
     """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
 
-    element_type: Annotated[StoryboardElementType, called("storyboardElementType")]
+    element_type: Annotated[enums.StoryboardElementType, called("storyboardElementType")]
     element_ref: Annotated[str, called("storyboardElementRef")]
-    state: StoryboardElementState
+    state: enums.StoryboardElementState
 
 
 class TrafficSignalCondition(Content, frozen=True):
@@ -99,7 +88,7 @@ class UserDefinedValueCondition(Content, frozen=True):
 
     name: str
     value: str
-    rule: Rule
+    rule: enums.Rule
 
 
 class EndOfRoadCondition(Content, frozen=True):
@@ -112,7 +101,7 @@ class CollisionCondition(Content, frozen=True):
     """Touches that entity, or any of that category."""
 
     entity_ref: str | None = None
-    by_type: EntityCategory | None = None
+    by_type: enums.EntityCategory | None = None
 
 
 class OffroadCondition(Content, frozen=True):
@@ -125,12 +114,12 @@ class Measured(Content, frozen=True, kw_only=True):
     """A distance, or what is made of one, against a value. `along_route` (1.0) None: not said."""
 
     value: AnyNumber
-    rule: Rule
+    rule: enums.Rule
     freespace: No
-    coordinate_system: CoordinateSystem | None = None
-    distance_type: Annotated[RelativeDistanceType | None, DistanceType] = None
+    coordinate_system: enums.CoordinateSystem | None = None
+    distance_type: Annotated[enums.RelativeDistanceType | None, DistanceType] = None
     along_route: bool | None = None
-    routing_algorithm: RoutingAlgorithm | None = None
+    routing_algorithm: enums.RoutingAlgorithm | None = None
 
 
 class TimeHeadwayCondition(Measured, frozen=True):
@@ -149,8 +138,8 @@ class AccelerationCondition(Content, frozen=True):
     """[m/s2]; `direction` None: the magnitude."""
 
     value: AnyNumber
-    rule: Rule
-    direction: DirectionalDimension | None = None
+    rule: enums.Rule
+    direction: enums.DirectionalDimension | None = None
 
 
 class StandStillCondition(Content, frozen=True):
@@ -163,8 +152,8 @@ class SpeedCondition(Content, frozen=True):
     """[m/s]; `direction` None: the scalar speed."""
 
     value: AnyNumber
-    rule: Rule
-    direction: DirectionalDimension | None = None
+    rule: enums.Rule
+    direction: enums.DirectionalDimension | None = None
 
 
 class RelativeSpeedCondition(SpeedCondition, frozen=True, kw_only=True):
@@ -197,11 +186,11 @@ class RelativeDistanceCondition(Content, frozen=True):
 
     entity_ref: EntityRef
     value: AnyNumber
-    rule: Rule
+    rule: enums.Rule
     freespace: No
-    distance_type: Annotated[RelativeDistanceType, DistanceType] = RelativeDistanceType.EUCLIDIAN
-    coordinate_system: CoordinateSystem | None = None
-    routing_algorithm: RoutingAlgorithm | None = None
+    distance_type: Annotated[enums.RelativeDistanceType, DistanceType] = enums.RelativeDistanceType.EUCLIDIAN
+    coordinate_system: enums.CoordinateSystem | None = None
+    routing_algorithm: enums.RoutingAlgorithm | None = None
 
 
 class RelativeLaneRange(Struct, frozen=True):
@@ -225,10 +214,10 @@ class RelativeClearanceCondition(Content, frozen=True):
 class AngleCondition(Content, frozen=True):
     """Own angle within a tolerance. [rad]"""
 
-    angle_type: AngleType
+    angle_type: enums.AngleType
     angle: float
     tolerance: Annotated[float, called("angleTolerance")]
-    coordinate_system: CoordinateSystem | None = None
+    coordinate_system: enums.CoordinateSystem | None = None
 
 
 class RelativeAngleCondition(AngleCondition, frozen=True, kw_only=True):

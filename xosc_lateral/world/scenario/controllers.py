@@ -112,10 +112,8 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     switched: tuple[tuple[Domains, bool | None], ...] = ()
     match content:
         case private_actions.AssignControllerAction():
-            switched = (
-                (Domains.LONGITUDINAL, content.activate_longitudinal),
-                (Domains.LATERAL, content.activate_lateral),
-            )
+            lateral, longitudinal = content.activate_lateral, content.activate_longitudinal
+            switched = (Domains.LONGITUDINAL, longitudinal), (Domains.LATERAL, lateral)
         case private_actions.ActivateControllerAction():
             switched = (Domains.LONGITUDINAL, content.longitudinal), (Domains.LATERAL, content.lateral)
         case private_actions.OverrideControllerValueAction():

@@ -14,7 +14,7 @@ import re
 from collections.abc import Callable, Mapping
 from operator import eq, ge, gt, le, lt, ne
 
-from xosc_lateral.base.limits import EXPRESSION, VALUE
+from xosc_lateral.base.limits import EXPRESSION_SIZE, VALUE_SIZE
 from xosc_lateral.world.scenario.enums import Rule
 
 MAX_CHAIN = 30
@@ -141,8 +141,8 @@ def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
 
     Raises `ExpressionError`: Syntax, domain (``sqrt(-1)``, division by zero) or overflow.
     """
-    if len(expression) > EXPRESSION.value:
-        raise ExpressionError(EXPRESSION.refusal(len(expression)))
+    if len(expression) > EXPRESSION_SIZE.value:
+        raise ExpressionError(EXPRESSION_SIZE.refusal(len(expression)))
     try:
         tokens = _tokens(expression)
         if any(kind == "word" and word not in FUNCTIONS and word not in CONSTANTS for kind, word in tokens):
@@ -219,8 +219,8 @@ def _joined(expression: str, resolve: Callable[[str], str]) -> str:
 
 def _check_length(length: int) -> None:
     """Parameters that refer to each other twice double with every step."""
-    if length > VALUE.value:
-        raise ExpressionError(VALUE.refusal(length))
+    if length > VALUE_SIZE.value:
+        raise ExpressionError(VALUE_SIZE.refusal(length))
 
 
 class _Parser:

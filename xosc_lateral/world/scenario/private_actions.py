@@ -6,22 +6,16 @@ from typing import Annotated
 
 from msgspec import Struct
 
+from xosc_lateral.world.scenario import enums
 from xosc_lateral.world.scenario.entity import Controller
-from xosc_lateral.world.scenario.enums import (
-    CoordinateSystem,
-    DynamicsDimension,
-    DynamicsShape,
-    FollowingMode,
-    LateralDisplacement,
-    LongitudinalDisplacement,
-    SpeedTargetValueType,
-)
 from xosc_lateral.world.scenario.place import AnyNumber, Content, EntityRef, No, Xml, called
 from xosc_lateral.world.scenario.position import Position, Route, Timing, Trajectory
 
 Limit = Annotated[float | None, Xml(finite=False)]
-ValueType = Annotated[SpeedTargetValueType, called("speedTargetValueType", default=SpeedTargetValueType.DELTA)]
-FOLLOWING_MODE = called("TrajectoryFollowingMode/followingMode", default=FollowingMode.FOLLOW)
+ValueType = Annotated[
+    enums.SpeedTargetValueType, called("speedTargetValueType", default=enums.SpeedTargetValueType.DELTA)
+]
+FOLLOWING_MODE = called("TrajectoryFollowingMode/followingMode", default=enums.FollowingMode.FOLLOW)
 SteadyStates = called("TargetDistanceSteadyState", "TargetTimeSteadyState")
 
 
@@ -31,10 +25,10 @@ class TransitionDynamics(Struct, frozen=True):
     The reference player takes a missing dimension for time; a step has no use for either.
     """
 
-    shape: Annotated[DynamicsShape, called("dynamicsShape", default=DynamicsShape.STEP)]
-    dimension: Annotated[DynamicsDimension, called("dynamicsDimension", default=DynamicsDimension.TIME)]
+    shape: Annotated[enums.DynamicsShape, called("dynamicsShape", default=enums.DynamicsShape.STEP)]
+    dimension: Annotated[enums.DynamicsDimension, called("dynamicsDimension", default=enums.DynamicsDimension.TIME)]
     value: AnyNumber
-    following_mode: FollowingMode = FollowingMode.POSITION
+    following_mode: enums.FollowingMode = enums.FollowingMode.POSITION
 
 
 class DynamicConstraints(Struct, frozen=True):
@@ -80,7 +74,7 @@ class SpeedProfileAction(Content, frozen=True):
     """Speeds over time; with `entity_ref`, relative to that entity's speed."""
 
     entries: tuple[SpeedProfileEntry, ...]
-    following_mode: Annotated[FollowingMode, Xml(default=FollowingMode.POSITION)]
+    following_mode: Annotated[enums.FollowingMode, Xml(default=enums.FollowingMode.POSITION)]
     entity_ref: Annotated[str | None, Xml(is_entity=True)] = None
     constraints: DynamicConstraints | None = None
 
@@ -93,8 +87,8 @@ class LongitudinalDistanceAction(Content, frozen=True):
     freespace: No
     distance: float | None = None
     time_gap: float | None = None
-    displacement: LongitudinalDisplacement | None = None
-    coordinate_system: CoordinateSystem | None = None
+    displacement: enums.LongitudinalDisplacement | None = None
+    coordinate_system: enums.CoordinateSystem | None = None
     constraints: DynamicConstraints | None = None
 
 
@@ -136,7 +130,7 @@ class LaneOffsetAction(Content, frozen=True):
     """Move inside the lane; `max_lateral_acc` None: as fast as can be. [m/s2]"""
 
     target: Annotated[AbsoluteTargetLaneOffset | RelativeTargetLaneOffset, called("LaneOffsetTarget")]
-    shape: DynamicsShape
+    shape: enums.DynamicsShape
     continuous: No
     max_lateral_acc: float | None = None
 
@@ -148,8 +142,8 @@ class LateralDistanceAction(Content, frozen=True):
     continuous: No
     freespace: No
     distance: float | None = None
-    displacement: LateralDisplacement = LateralDisplacement.ANY
-    coordinate_system: CoordinateSystem | None = None
+    displacement: enums.LateralDisplacement = enums.LateralDisplacement.ANY
+    coordinate_system: enums.CoordinateSystem | None = None
     constraints: DynamicConstraints | None = None
 
 
@@ -203,7 +197,7 @@ class FollowTrajectoryAction(Content, frozen=True):
 
     trajectory: Annotated[Trajectory, called("")]
     timing: Annotated[Timing | None, called("TimeReference/Timing")]
-    following_mode: Annotated[FollowingMode, FOLLOWING_MODE]
+    following_mode: Annotated[enums.FollowingMode, FOLLOWING_MODE]
     initial_distance_offset: float = 0.0
 
 

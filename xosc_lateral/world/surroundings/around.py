@@ -25,7 +25,7 @@ IN_SIGHT = 2.0 * SIGHT_DISTANCE + 100.0
 """Vehicles never nearer than this in a straight line are not searched along the lane. Free space is counted along the
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
-ALONGSIDE = 10.0
+ALONGSIDE_DISTANCE = 10.0
 """A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
 
 INFLUENCE_DISTANCE = 40.0
@@ -206,7 +206,7 @@ class _Side:
         np.fmin.at(self.distance, rows, gap - INFLUENCE_DISTANCE * np.log(share))
         influence = share * np.exp(-gap / INFLUENCE_DISTANCE)
         np.add.at(self.influence, rows, influence)
-        alongside = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
+        alongside = share * (1.0 - smooth_step(gap / ALONGSIDE_DISTANCE - 0.5))
         # a truck comes into sight in the last quarter of the reach
         np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / SIGHT_DISTANCE - 3.0)))
         np.maximum.at(self.truck_alongside, rows, is_truck * alongside)
@@ -225,7 +225,7 @@ def smooth_step(u: FloatArray) -> FloatArray:
 
 
 # ---- which vehicles come near each other at all: the index that spares looking at every pair of them ----
-BLOCK = 64
+BLOCK_ROWS = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
 
 
@@ -238,7 +238,7 @@ def stretches_within(
     the pairs that are near, not with all there are.
 
     `x`, `y`: arrays of shape (n,) for each point on one time grid, NaN where it is absent, looked at once; `reach` in
-    [m]; a stretch has `blocks` of `BLOCK` rows. Yields its rows, and pairs of indices in lexical order, each ascending.
+    [m]; a stretch has `blocks` of `BLOCK_ROWS`. Yields its rows, and pairs of indices in lexical order, each ascending.
     """
     lows, highs = _bounds(x, y)
     for begin in range(0, lows.shape[1], blocks):
@@ -248,7 +248,7 @@ def stretches_within(
             first, second = _overlapping(low[:, block, there], high[:, block, there], there, reach, block)
             if len(first):
                 pairs = set(zip(first.tolist(), second.tolist(), strict=True))
-                yield slice(BLOCK * begin, BLOCK * (begin + blocks)), sorted(pairs)
+                yield slice(BLOCK_ROWS * begin, BLOCK_ROWS * (begin + blocks)), sorted(pairs)
 
 
 def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
@@ -262,7 +262,7 @@ def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArra
     """Smallest and largest x, y of each point in each block, shape (2, blocks, points), NaN where it is absent. [m]"""
     lows, highs = [np.empty((2, 0))], [np.empty((2, 0))]
     for point in zip(x, y, strict=True):
-        starts = np.arange(0, len(point[0]), BLOCK)
+        starts = np.arange(0, len(point[0]), BLOCK_ROWS)
         for extremes, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
             extremes.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
     low, high = (np.stack(extremes[1:] or extremes, axis=-1) for extremes in (lows, highs))

@@ -25,11 +25,11 @@ from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentAction, Weather
 from xosc_lateral.world.surroundings import around
 
-STEERING = 1.0
+STEERING_DURATION = 1.0
 """Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
 two. [s]"""
 
-CELLS = 100_000
+ROWS_TOGETHER = 100_000
 """Rows of all others that are looked at together: as many as stay in a processor's cache. [-]"""
 
 TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
@@ -43,7 +43,7 @@ def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid
     """
     entity = motion.entities[index]
     road = _road(entity, network, grid)
-    step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING
+    step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING_DURATION
     beside = _neighbours(motion, network, index, grid, _lanes_there(road, step))
     road = {name: _around(values, step) for name, values in road.items()}
     return _own_motion(entity, grid) | road | beside | _weather(motion, entity, grid)
@@ -100,8 +100,8 @@ def _around(values: FloatArray, step: float) -> FloatArray:
     known = np.isfinite(values)
     if not known.any() or np.ptp(values[known]) == 0.0:
         return values
-    half = round(4.0 * STEERING / step)
-    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) * step / STEERING) ** 2)
+    half = round(4.0 * STEERING_DURATION / step)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) * step / STEERING_DURATION) ** 2)
     parts = (np.pad(part, half) for part in (np.where(known, values, 0.0), known * 1.0))
     total, weight = (np.convolve(part, kernel, "valid") for part in parts)
     return np.where(known, total / np.where(known, weight, 1.0), np.nan)
@@ -129,7 +129,7 @@ def _neighbours(
     for stretch, in_sight in _in_sight(motion):
         numbers = np.array([k for k in in_sight[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
         inside = [slice(*np.searchsorted(grid[rows], (stretch.start, stretch.stop))) for rows, _, _ in groups]
-        together = max(1, CELLS // max(1, *(part.stop - part.start for part in inside), 1))
+        together = max(1, ROWS_TOGETHER // max(1, *(part.stop - part.start for part in inside), 1))
         for begin in range(0, len(numbers), together):
             others = numbers[begin : begin + together]
             for part, (of_group, own_u, path) in zip(inside, groups, strict=True):
@@ -173,7 +173,7 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
     names = ("road", "lane", "s", "offset", "activity", "heading_relative")
     count, n = len(motion.entities), len(motion.entities[0].time[first::every])
     tables = [empty((count, n), kind) for kind in (np.int32, np.float64, np.float64, np.int8)]
-    together = max(1, CELLS // max(n, 1))
+    together = max(1, ROWS_TOGETHER // max(n, 1))
     for begin in range(0, count, together):
         entities = motion.entities[begin : begin + together]
         stacked = (np.concatenate([getattr(one, name)[first::every] for one in entities]) for name in names)

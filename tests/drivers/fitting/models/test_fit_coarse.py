@@ -12,7 +12,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     _restored,
     fit_coarse,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
     COARSE_EVERY,
     GRID,

@@ -11,9 +11,9 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SE
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     LARGEST_STEP,
     MOST_CORRELATED,
-    NUDGE,
-    SIMULATED,
+    SIMULATED_DRIVERS,
     SNIPPETS_EACH,
+    VARIANCE_NUDGE,
     _asked,
     _coarse_gain,
     _corrected,
@@ -26,7 +26,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     matched,
     simulate,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import GRID, Autoregression
+from xosc_lateral.drivers.model.core.autoregressive.parameters import GRID, Autoregression
 
 NOTHING, SLOPES = np.zeros(7), np.ones(2)
 
@@ -98,7 +98,9 @@ def test_log_sizes_that_lack_so_much_enlarge_the_scale_by_it() -> None:
     assert larger.coarse.scale == pytest.approx(POPULATION.coarse.scale * np.exp(0.1))
 
 
-@pytest.mark.parametrize(("lack", "step"), [(0.05, 0.05), (-0.05, -0.05), (9.0, NUDGE), (-9.0, -NUDGE)])
+@pytest.mark.parametrize(
+    ("lack", "step"), [(0.05, 0.05), (-0.05, -0.05), (9.0, VARIANCE_NUDGE), (-9.0, -VARIANCE_NUDGE)]
+)
 def test_volatility_grows_by_what_lacks_over_the_slope_and_no_further_than_was_tried(lack: float, step: float) -> None:
     lacks = np.array([0.0, lack, 0.0, lack, 0.0, 0.0, 0.0])
     found = _corrected(POPULATION, lacks, SLOPES, DEFAULT_SETTINGS)
@@ -132,10 +134,10 @@ def test_a_straight_path_has_no_wiggle_and_a_parabola_the_same_everywhere() -> N
 
 
 def test_drives_beyond_one_batch_are_others() -> None:
-    few, many = (_drives_of(STEADY, 51, 7, drivers) for drivers in (SIMULATED, SIMULATED + 3))
-    np.testing.assert_array_equal(many[:SIMULATED], few)
-    assert many.shape == (SIMULATED + 3, SNIPPETS_EACH * 51)
-    assert not np.array_equal(many[SIMULATED:], many[:3])
+    few, many = (_drives_of(STEADY, 51, 7, drivers) for drivers in (SIMULATED_DRIVERS, SIMULATED_DRIVERS + 3))
+    np.testing.assert_array_equal(many[:SIMULATED_DRIVERS], few)
+    assert many.shape == (SIMULATED_DRIVERS + 3, SNIPPETS_EACH * 51)
+    assert not np.array_equal(many[SIMULATED_DRIVERS:], many[:3])
 
 
 def test_simulated_drives_are_the_model_s_drives() -> None:

@@ -15,7 +15,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     shaped,
     window_of,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ShapedNoise
 
 KNOTS = np.linspace(0.0, 2.5, DEFAULT_SETTINGS.n_knots)

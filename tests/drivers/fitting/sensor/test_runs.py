@@ -8,8 +8,7 @@ import pytest
 from tests.kit.core_models import POPULATION
 from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.drives.cuts import cut_runs
-from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.drive import Drive, cut_runs
 from xosc_lateral.drivers.fitting.fitting import driver_runs, rows_of
 from xosc_lateral.drivers.fitting.sensor.periodogram import WINDOWS
 from xosc_lateral.drivers.model.profile import DriverProfile

@@ -10,10 +10,9 @@ from examples.driver_simulator.simulator import simulate_drive
 from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.resampling import resample
-from xosc_lateral.drivers.fitting.fitting import fit_runs
+from xosc_lateral.drivers.fitting.fitting import fit_runs, fit_warnings
 from xosc_lateral.drivers.fitting.sensor.periodogram import quantisation_step, rounding_density
 from xosc_lateral.drivers.fitting.sensor.separation import separate
-from xosc_lateral.drivers.fitting.warnings import fit_warnings
 from xosc_lateral.drivers.model.records import plain, read_as
 from xosc_lateral.drivers.model.sensor import SensorModel
 

@@ -11,7 +11,7 @@ from xosc_lateral.drivers.fitting.sensor.likelihood import (
     BRISKEST_CORNER,
     FREE_BELOW,
     KNOTS,
-    LAGS,
+    LAG_CORNER,
     N_KNOTS,
     N_STATE,
     SLOPE_SD,
@@ -44,7 +44,7 @@ def power_law(slope: float) -> np.ndarray:
 def test_knots_rise_from_a_minute_and_more_to_what_no_steering_does() -> None:
     assert np.all(np.diff(KNOTS) > 0.0)
     assert 1.0 / KNOTS[0] >= 60.0  # slower than the minute within which a lane is kept
-    assert KNOTS[-1] > LAGS  # beyond the corner of muscles and vehicle
+    assert KNOTS[-1] > LAG_CORNER  # beyond the corner of muscles and vehicle
 
 
 def test_knots_are_close_enough_for_the_bends_between_the_corners() -> None:
@@ -55,7 +55,7 @@ def test_knots_are_close_enough_for_the_bends_between_the_corners() -> None:
 
 
 def test_corners_of_the_prior_lie_between_knots_of_either_side() -> None:
-    for corner in (FREE_BELOW, BRISKEST_CORNER, LAGS):
+    for corner in (FREE_BELOW, BRISKEST_CORNER, LAG_CORNER):
         assert np.count_nonzero(corner - 1e-12 > KNOTS) >= 2
         assert np.count_nonzero(corner + 1e-12 < KNOTS) >= 2
 
@@ -72,7 +72,7 @@ def test_the_slope_is_that_of_keeping_a_lane_below_and_of_two_integrations_and_m
     assert slope_at(BRISKEST_CORNER) == pytest.approx(
         -3.5 - 3.0 * BRISKEST_CORNER**2 / (1.0 + BRISKEST_CORNER**2), abs=1e-6
     )
-    assert slope_at(LAGS) == pytest.approx(-6.0 - 1.5, abs=0.01)
+    assert slope_at(LAG_CORNER) == pytest.approx(-6.0 - 1.5, abs=0.01)
     assert slope_at(1e3) == pytest.approx(-9.0, abs=1e-4)  # -4 - 2 - 3
 
 

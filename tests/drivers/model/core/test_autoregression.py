@@ -7,7 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import fit_autoregression
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression, stabilise
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, stabilise
 from xosc_lateral.drivers.model.linear_filters import recur
 
 SECOND_ORDER = np.array([1.6, -0.8])

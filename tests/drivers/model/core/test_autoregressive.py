@@ -13,7 +13,7 @@ from examples.driver_simulator import simulate_drive
 from tests.kit.core_models import POPULATION, STEADY
 from tests.kit.profiles import as_drive
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.drives.cuts import PAPER_RULES, all_runs
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, all_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean

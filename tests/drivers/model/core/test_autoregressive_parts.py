@@ -8,19 +8,25 @@ from msgspec.structs import replace
 from scipy import signal, stats
 
 from xosc_lateral.base.plugins import shipped_folder
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.model import (
+    COARSE,
+    FINE,
+    AutoregressiveModel,
+    Factors,
+    begin_factors,
+)
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
     COARSE_EVERY,
     TICKS,
+    Volatility,
     building_low_pass,
+    draw_drivers,
     interpolate,
     measuring_low_pass,
     phases,
     split_bands,
 )
-from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, draw_drivers
-from xosc_lateral.drivers.model.core.autoregressive.parts import COARSE, FINE, Factors, begin_factors
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.files.profiles import read_profile
 

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
-from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE, AutoregressiveState, _bends
+from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveState, _bends
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.records import plain, read_as
 
@@ -25,7 +25,7 @@ def seed(number: int) -> np.random.SeedSequence:
 def test_bends_begin_at_a_share_of_the_way_to_either_limit() -> None:
     knees, limits = _bends(STEADY, np.array([STEADY.mean]))
     np.testing.assert_allclose(limits[:, 0], STEADY.limits)
-    np.testing.assert_allclose(knees[:, 0], STEADY.mean + KNEE * (np.array(STEADY.limits) - STEADY.mean))
+    np.testing.assert_allclose(knees[:, 0], STEADY.mean + KNEE_SHARE * (np.array(STEADY.limits) - STEADY.mean))
 
 
 @pytest.mark.parametrize(("first", "side"), [(0.39, 1), (0.55, 1), (-0.44, 0), (-0.7, 0)])

@@ -7,8 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.fitting.models.two_level import fit_markov_chain
-from xosc_lateral.drivers.model.core.two_level.markov import AliasTable, MarkovChain, bin_of, open_traps
-from xosc_lateral.drivers.model.core.two_level.model import walk
+from xosc_lateral.drivers.model.core.two_level.model import AliasTable, MarkovChain, bin_of, open_traps, walk
 
 
 def made_chain(n: int = 20) -> np.ndarray:

@@ -12,9 +12,8 @@ from scipy.linalg import toeplitz
 
 from tests.kit.core_models import POPULATION, STEADY
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, interpolate
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import START_LAGS
+from xosc_lateral.drivers.model.core.autoregressive.parameters import COARSE_EVERY, START_LAGS, interpolate
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE
 from xosc_lateral.drivers.model.records import plain, read_as
 

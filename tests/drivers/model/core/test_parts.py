@@ -8,12 +8,10 @@ from msgspec.structs import replace
 from scipy.signal import lfilter
 
 from tests.kit.core_models import POPULATION, STEADY
-from xosc_lateral.drivers.model.core.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
-from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import DriverState
-from xosc_lateral.drivers.model.core.autoregressive.parts import (
+from xosc_lateral.drivers.model.core.autoregressive.model import (
     COARSE,
     FINE,
+    AutoregressiveModel,
     CoarsePart,
     CoarseState,
     Factors,
@@ -21,6 +19,7 @@ from xosc_lateral.drivers.model.core.autoregressive.parts import (
     FineState,
     begin_factors,
 )
+from xosc_lateral.drivers.model.core.autoregressive.parameters import COARSE_EVERY, TICKS, DriverState, interpolate
 
 N = 203
 SEED = np.random.SeedSequence(3)

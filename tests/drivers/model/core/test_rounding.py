@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from tests.kit.core_models import POPULATION
 from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import DIGITS, rounded
-from xosc_lateral.drivers.model.core.autoregressive.coarse import Autoregression
+from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
 from xosc_lateral.drivers.model.records import plain
 
 

@@ -21,7 +21,7 @@ from msgspec.structs import replace
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     COARSE_EVERY,
     FREQUENCIES,
     GRID,
@@ -88,7 +88,7 @@ def fit_autoregression(
     return Autoregression(stabilise(coefficients), scale)
 
 
-TURNS = 20
+MAXIMUM_TURNS = 20
 """Of fitting both in turn at most: each leaves less than a third of the last one's error on runs of a minute. [-]"""
 
 SHARE_TOLERANCE = 1e-3
@@ -111,7 +111,7 @@ def fit_coarse(
     variance = float(np.mean(np.concatenate(slow) ** 2))
     covariance, lags, pairs = _far_covariance(slow, len(set(drives)), settings) if several else (0.0, [1], [1])
     between = float(np.clip(covariance, 0.0, 0.9 * variance))
-    for _ in range(TURNS):
+    for _ in range(MAXIMUM_TURNS):
         coarse = fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives, between=between)
         if not several:
             break

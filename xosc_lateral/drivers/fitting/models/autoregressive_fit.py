@@ -40,16 +40,17 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     scaled_spectrum,
     window_of,
 )
-from xosc_lateral.drivers.model.core.autoregressive.coarse import (
+from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
     COARSE_EVERY,
     FREQUENCIES,
     Autoregression,
+    Volatility,
+    averaged_covariance,
     largest_root,
     split_bands,
 )
-from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility, averaged_covariance
 from xosc_lateral.drivers.model.core.base import Start
 
 DIGITS = 5
@@ -61,7 +62,7 @@ MAXIMUM_LOG_POWER_CHANGE = 2e-3
 """Largest change of the coarse movement's log power that rounding may make at any frequency: 0.01 dB. Coefficients of
 an autoregression nearly add up to one, and what they lack of it decides how far a driver wanders. [-]"""
 
-HELD, HELD_WITHIN, HELD_SHARE = 3.0, 120.0, 0.01
+HELD_SECONDS, HELD_WITHIN, HELD_SHARE = 3.0, 120.0, 0.01
 """Limits lie where coarse movement stays beyond for so long in so long a drive with this chance: extremes of few
 drivers' minutes lie nearer, and their drivers would sit at them (17.7 % of two-minute runs). [s], [s], [-]"""
 
@@ -112,7 +113,7 @@ def _held_reach(model: AutoregressiveModel, settings: FitSettings) -> float:
     """Distance from the mean beyond which free coarse movement is held so seldom that a limit there is hardly seen."""
     free = replace(model, limits=(-1.0, 1.0)).stream(np.random.SeedSequence(settings.seed), drivers=HELD_DRIVES)
     away = np.abs(free.take(round(HELD_WITHIN / model.step))[0] - model.mean)
-    held = sliding_window_view(away, round(HELD / model.step), axis=0).min(axis=-1).max(axis=0)
+    held = sliding_window_view(away, round(HELD_SECONDS / model.step), axis=0).min(axis=-1).max(axis=0)
     return float(np.quantile(held, 1.0 - HELD_SHARE))
 
 
@@ -153,7 +154,7 @@ def fit_autoregressive(
 
 
 # ---- volatility, and rounds of simulating and comparing ----
-SIMULATED, SNIPPETS_EACH = 4000, 3
+SIMULATED_DRIVERS, SNIPPETS_EACH = 4000, 3
 """Drivers that a round simulates at once, and snippets of each: what chance does to the mean log spread of so many is
 0.6 %. [-]"""
 
@@ -164,7 +165,7 @@ that chance is a bias of every profile: an eighth of the data's own error, and 0
 LEAST_VOLATILITY = Volatility(0.0, 1e-3, 10.0)
 """Of a movement that seems steady: rounds scale a volatility, and from none nothing grows. 3 % up and down."""
 
-NUDGE = float(np.log(2.0))
+VARIANCE_NUDGE = float(np.log(2.0))
 """Change of the log variance of the volatilities by which the moments' slopes are measured, and the largest that a
 round makes: beyond, the slopes are extrapolated. [-]"""
 
@@ -228,14 +229,14 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
     )
     target, window = _moments(real), window_of(runs, settings.compared_windows, settings)
     spectrum = _log_spectrum(runs, window)
-    many = min(max(FOR_EACH * len(real) // SNIPPETS_EACH, SIMULATED), MOST_SIMULATED)
+    many = min(max(FOR_EACH * len(real) // SNIPPETS_EACH, SIMULATED_DRIVERS), MOST_SIMULATED)
     slopes: FloatArray | None = None
     for left in reversed(range(settings.rounds)):
-        simulated = _drives_of(model, length, settings.seed, SIMULATED if left else many)
+        simulated = _drives_of(model, length, settings.seed, SIMULATED_DRIVERS if left else many)
         lacks, moments = spectrum - _log_spectrum([simulated], window), _moments(simulated.reshape(-1, length))
         if slopes is None:
-            nudged = _drives_of(_volatile(model, NUDGE, NUDGE), length, settings.seed, len(simulated))
-            slopes = _asked(_moments(nudged.reshape(-1, length)) - moments) / NUDGE
+            nudged = _drives_of(_volatile(model, VARIANCE_NUDGE, VARIANCE_NUDGE), length, settings.seed, len(simulated))
+            slopes = _asked(_moments(nudged.reshape(-1, length)) - moments) / VARIANCE_NUDGE
         fine = replace(model.fine, damping=model.fine.damping * _gain(model, lacks))
         scale, model = model.coarse.scale, _corrected(model, target - moments, slopes, settings)
         still = lacks - 2.0 * np.log(model.coarse.scale / scale)  # lacking after the coarse movement was scaled
@@ -246,8 +247,8 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
 def _drives_of(model: AutoregressiveModel, length: int, seed: int, drivers: int) -> FloatArray:
     """Free runs as long as several snippets, each by its own driver, shape (n, length of a run). [lane widths]"""
     parts = [
-        simulate(model, SNIPPETS_EACH * length, seed + first, drivers=min(SIMULATED, drivers - first))
-        for first in range(0, drivers, SIMULATED)
+        simulate(model, SNIPPETS_EACH * length, seed + first, drivers=min(SIMULATED_DRIVERS, drivers - first))
+        for first in range(0, drivers, SIMULATED_DRIVERS)
     ]
     return np.concatenate(parts)
 
@@ -318,7 +319,7 @@ def _corrected(
 ) -> AutoregressiveModel:
     """The model with each parameter moved against what its moment lacks; `slopes` of what is asked, shape (2,)."""
     larger = float(np.exp(0.5 * (lacks[0] + lacks[2])))
-    coarse, fine = np.clip(_asked(lacks) / np.maximum(slopes, LEAST_SLOPE), -NUDGE, NUDGE).tolist()
+    coarse, fine = np.clip(_asked(lacks) / np.maximum(slopes, LEAST_SLOPE), -VARIANCE_NUDGE, VARIANCE_NUDGE).tolist()
     shown = [part.over(settings.snippet) for part in (model.coarse_volatility, model.fine_volatility)]
     correlation = model.correlation + lacks[6] / max(np.sqrt(shown[0] * shown[1]), LEAST_SLOPE)
     return replace(

@@ -16,8 +16,14 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.filters import periodograms
 from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
-from xosc_lateral.drivers.model.core.two_level.markov import N_BINS, MarkovChain, bin_of
-from xosc_lateral.drivers.model.core.two_level.model import PAPER_SETTINGS, TwoLevelModel, TwoLevelSettings
+from xosc_lateral.drivers.model.core.two_level.model import (
+    N_BINS,
+    PAPER_SETTINGS,
+    MarkovChain,
+    TwoLevelModel,
+    TwoLevelSettings,
+    bin_of,
+)
 from xosc_lateral.drivers.model.linear_filters import convolve
 
 
@@ -96,7 +102,7 @@ def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings 
 # [1] C. Gourieroux, A. Monfort, E. Renault, "Indirect inference", J. Applied Econometrics 8, 1993.
 
 ROUNDS, STEPS = 6, 200_000  # Rounds, and simulated steps of each: 11 h, whose scatter is a per cent.
-PARTS = 100  # Of a transition: counts are whole numbers.
+PARTS_EACH = 100  # Of a transition: counts are whole numbers.
 LARGEST_CHANGE = 2.0  # Factor of one round, at most. [-]
 SEED = 0  # The same each time: same drives, same profile.
 
@@ -112,8 +118,8 @@ def correct_two_level(model: TwoLevelModel) -> TwoLevelModel:
         factor *= float(_bounded(target / max(leaving_rate(again.counts), 1e-12)))
         damping = damping * _bounded(model.damping / np.maximum(again.damping, 1e-12))
         most = np.minimum(factor, total / np.maximum(out.sum(axis=1), 1))
-        parts = np.rint(PARTS * out * most[:, None]).astype(np.int64)
-        counts = parts + np.diag(np.maximum(PARTS * total - parts.sum(axis=1), 0))
+        parts = np.rint(PARTS_EACH * out * most[:, None]).astype(np.int64)
+        counts = parts + np.diag(np.maximum(PARTS_EACH * total - parts.sum(axis=1), 0))
         corrected = TwoLevelModel(model.settings, counts, damping)
     return corrected
 

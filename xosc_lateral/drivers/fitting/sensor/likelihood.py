@@ -46,7 +46,7 @@ KNOTS = np.array([0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.2, 0.27, 0.35, 0.
 """[Hz]"""
 
 FREE_BELOW = 0.1
-LAGS = 1.0
+LAG_CORNER = 1.0
 """Corners: of lane keeping at will, of muscles and vehicle. [Hz]"""
 
 BRISKEST_CORNER = 0.27
@@ -78,7 +78,9 @@ def expected_log_density(frequency: FloatArray, shift: float = 0.0) -> FloatArra
     """
     steps = POWER_BEYOND - POWER_BELOW
     bend = np.logaddexp(0.0, steps * (np.log(frequency / BRISKEST_CORNER) - shift))
-    return np.asarray(-POWER_BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
+    return np.asarray(
+        -POWER_BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAG_CORNER) ** 2)
+    )
 
 
 SLOPES = np.diff(np.eye(N_KNOTS), axis=0) / np.diff(_LOG)[:, None]

@@ -24,7 +24,7 @@ WINDOWS = (102.4, 51.2, 25.6, 12.8)
 
 MINIMUM_PIECES = 16
 
-INDEPENDENT = 0.53
+INDEPENDENT_SHARE = 0.53
 """Independent windows per Hann window at half overlap (Welch 1967, eq. for the variance at 50 % overlap). [-]"""
 
 LEAST_DENSITY = 1e-12
@@ -33,7 +33,7 @@ LEAST_DENSITY = 1e-12
 PASSED_FREQUENCY = 1.5
 """Resampling to 5 Hz keeps what is slower than this. [Hz]"""
 
-BINS_FROM, BIN = 0.12, 0.05
+BINS_FROM, BIN_SHARE = 0.12, 0.05
 """Above the first frequency [Hz], neighbouring ones within this share are averaged. [-]"""
 
 
@@ -80,12 +80,12 @@ def periodogram(frequency: FloatArray, windows: FloatArray, highest: float = PAS
     at = len(edges)
     while at < len(known):
         edges.append(at)
-        at = max(at + 1, int(np.searchsorted(known, known[at] * (1.0 + BIN))))
+        at = max(at + 1, int(np.searchsorted(known, known[at] * (1.0 + BIN_SHARE))))
     count = np.diff([*edges, len(known)])
     return Periodogram(
         np.add.reduceat(known, edges) / count,
         np.add.reduceat(density, edges) / count,
-        (INDEPENDENT * len(windows) + 0.5) * count,
+        (INDEPENDENT_SHARE * len(windows) + 0.5) * count,
     )
 
 
@@ -143,13 +143,13 @@ def uniform_variance(step: float) -> float:
     return step**2 / 12.0
 
 
-LAGS = 60.0
+LONGEST_LAG = 60.0
 """Beyond it the error of rounding has forgotten: drivers have moved by many steps, or stood still throughout. [s]"""
 
 DENSE_RATE = 20.0
 """What drivers do hardly shows between lags of this rate: of faster rows it is interpolated. [Hz]"""
 
-ORDERS = 59
+SERIES_TERMS = 59
 """Terms of the closed form, whose squares fall: what is left is 0.3 % of the variance. [-]"""
 
 
@@ -167,16 +167,8 @@ def rounding_density(
     ``q^2 / (2 pi^2) sum_k exp(-2 pi^2 k^2 D(tau) / q^2) / k^2``. Noise that is new in every row adds twice its variance
     to D between different rows: beside enough of it the error is new in every row, too.
 
-    Parameters
-    ----------
-    step : float
-        q. [m]
-    driver, variance : callable, float
-        Density of what is rounded, at frequencies [m2/Hz], and what it is scaled to: the variance less the noise [m2].
-    rate : float
-        Rows per second. [Hz]
-    noise : float
-        Variance of white noise before rounding. [m2]
+    `step`: q [m]; `driver`, `variance`: density of what is rounded, at frequencies [m2/Hz], and what it is scaled to,
+    the variance less the noise [m2]; `rate`: rows per second [Hz]; `noise`: variance of white noise before that [m2].
 
     References
     ----------
@@ -187,11 +179,11 @@ def rounding_density(
     spacing = float(frequency[1] - frequency[0])
     power = driver(frequency) * spacing
     power *= variance / power.sum()
-    lag = np.arange(1, max(round(LAGS * rate), 1) + 1) / rate
-    known = np.arange(round(LAGS * min(rate, DENSE_RATE)) + 2) / min(rate, DENSE_RATE)
+    lag = np.arange(1, max(round(LONGEST_LAG * rate), 1) + 1) / rate
+    known = np.arange(round(LONGEST_LAG * min(rate, DENSE_RATE)) + 2) / min(rate, DENSE_RATE)
     moved = np.sqrt(2.0 * (1.0 - np.cos(2.0 * np.pi * np.outer(known, frequency))) @ power)
     structure = np.interp(lag, known, moved) ** 2 + 2.0 * noise
-    order = np.arange(1, ORDERS + 1)[:, None]
+    order = np.arange(1, SERIES_TERMS + 1)[:, None]
     terms = np.exp(-2.0 * (np.pi * order) ** 2 * structure / step**2) / order**2
     covariance = step**2 / (2.0 * np.pi**2) * terms.sum(axis=0)
     at = np.concatenate([[0.005], np.geomspace(0.01, 3.0, 90)])
@@ -224,7 +216,7 @@ KNOTS = np.array([0.01, 0.02, 0.035, LOWEST_FREQUENCY, 0.07, 0.1, 0.14, 0.2, 0.2
 BEND_SD = 1.0
 """Of a change of the slope from one knot to the next, as for a driver. [-]"""
 
-FINE = 1000
+INTEGRAL_POINTS = 1000
 """Frequencies of the variance's integral. [-]"""
 
 
@@ -252,7 +244,7 @@ class SecondView:
         """Of what is slower than `highest` [Hz]. [m2]"""
         from scipy.integrate import trapezoid
 
-        frequency = np.linspace(0.0, highest, FINE)
+        frequency = np.linspace(0.0, highest, INTEGRAL_POINTS)
         return float(trapezoid(self.density(frequency), frequency))
 
 

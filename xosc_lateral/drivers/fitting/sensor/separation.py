@@ -18,7 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
-from xosc_lateral.drivers.drives.filters import scale_frequencies
+from xosc_lateral.drivers.drives.filters import mirrored, scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, density, solve
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSE_STEP_RATIO,
@@ -68,14 +68,11 @@ class Separation:
         n = len(offset)
         if n < 2:
             return offset
-        mean = float(offset.mean())
-        about = offset - mean
-        extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
-        frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
-        driver = density(self.knots, frequency)
+        frequency: FloatArray = np.asarray(np.fft.rfftfreq(3 * n - 2, step), dtype=np.float64)
+        driver, mean = density(self.knots, frequency), float(offset.mean())
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        filtered = scale_frequencies(extended, np.sqrt(share))
+        filtered = scale_frequencies(mirrored(offset - mean, n - 1), np.sqrt(share))
         return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
 
 
@@ -96,20 +93,12 @@ def separate(
     Raises `NotEnoughDataError` if no run lasts 12.8 s; `DriverProfileError` if the error that is known is more than all
     that was measured.
 
-    Parameters
-    ----------
-    runs, step
-        Offsets [m] at an even step [s].
-    rows, durations
-        The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
-        long each row stands for, where rows are not even in time [s].
-    rate
-        Rows per second; without, as many as there are in the time of the runs. [Hz]
-    sensor_noise
-        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    half_widths, one_camera
-        Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
-        that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
+    Of offsets [m] at an even step [s], up to a `highest` frequency [Hz]. `rows`: the same runs as recorded, in which
+    variances are counted and rounding is detected [m]; `durations`: how long each row stands for, where rows are not
+    even in time [s]; `rate`: rows per second, without as many as there are in the time of the runs [Hz].
+    `sensor_noise`: standard deviation of the sensor's error on the rows, rounding included, where it is known [m].
+    `half_widths`: half the lane width in the runs, where a camera measured it, a second view of its errors [m];
+    `one_camera`: that is known to have measured the offset, else what the width shows is taken where plausible.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
@@ -261,7 +250,7 @@ def _interval(
 
 # ---- what may explain the runs ----
 ORDERS = (1, 2, 4)
-LOWEST_CORNER, HIGHEST_CORNER, GRID = 0.05, 1.4, 1.3
+LOWEST_CORNER, HIGHEST_CORNER, CORNER_FACTOR = 0.05, 1.4, 1.3
 """Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
 Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
 
@@ -306,7 +295,7 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     """Over a grid of corners, and between the neighbours of the best."""
     from scipy.optimize import minimize_scalar
 
-    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(GRID))) + 1
+    count = int(np.ceil(np.log(HIGHEST_CORNER / LOWEST_CORNER) / np.log(CORNER_FACTOR))) + 1
     tried_at = np.geomspace(LOWEST_CORNER, HIGHEST_CORNER, count)
     corners = all_significant(tried_at[tried_at >= LEAST_CORNER[order]], CORNER_DIGITS)
     grid = [_explanation(measured, Colour(order, corner, alone)) for corner in corners]

@@ -128,16 +128,11 @@ def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, Flo
     quantity = effect.seen({column: coarse.context[column][inside] for column in effect.columns})
     quantity = quantity[np.isfinite(quantity).all(axis=1)]
     if quantity.shape[1] == 1:
-        low, high = _ends(quantity[:, 0])
-        return np.array([low]), np.array([high])
-    return _by_strength(quantity, effect.coefficients)
-
-
-def _by_strength(quantity: FloatArray, coefficients: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Rows of the weak and of the strong end, shape (k,) each. [own unit]"""
-    order = np.argsort(quantity @ np.asarray(coefficients))
-    low, high = (min(len(order) - 1, int(share * len(order))) for share in DRIVING_QUANTILES)
-    return quantity[order[low]], quantity[order[high]]
+        low, high = _ends(quantity[:, 0])[:, None]
+        return low, high
+    order = np.argsort(quantity @ np.asarray(effect.coefficients))
+    weak, strong = (order[min(len(order) - 1, int(share * len(order)))] for share in DRIVING_QUANTILES)
+    return quantity[weak], quantity[strong]
 
 
 def span(coarse: Coarse, effect: ColumnEffect) -> float:

@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop import refinement
 from xosc_lateral.drivers.loop.autocorrelation import Problem
 from xosc_lateral.drivers.loop.candidates import shapes_of
 from xosc_lateral.drivers.loop.column_search import SearchedTerm, grows
@@ -26,17 +27,8 @@ from xosc_lateral.drivers.loop.columns import Column, read_column
 from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.low_frequencies import penalised
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
-from xosc_lateral.drivers.loop.omnibus import DELAYS, check_remainder, smooth_covariance, tents, weights_of
+from xosc_lateral.drivers.loop.omnibus import KERNELS, SECONDS, SMOOTH_COVARIANCE, check_remainder, tents
 from xosc_lateral.drivers.loop.passage import Passage, passage_of, typical_passage
-from xosc_lateral.drivers.loop.refinement import (
-    FINE_RESPONSES,
-    LAG_STEPS,
-    lags_about,
-    means_by_second,
-    other_centres,
-    other_scales,
-    running_sums,
-)
 from xosc_lateral.drivers.loop.terms.column import driving_range, of_kind
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Effect, Product, Proximity
@@ -144,7 +136,7 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
     """Other shapes of the only column, or scales and centres of a product, with one coefficient and the same timing."""
     timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
     if isinstance(effect, Product):
-        others = (*other_scales(effect, NEAR_SCALES), *other_centres(effect, coarse))
+        others = (*refinement.other_scales(effect, NEAR_SCALES), *refinement.other_centres(effect, coarse))
         return [structs.replace(other, response_range=()) for other in others]
     if len(effect.columns) > 1 or len(effect.coefficients) > 1:
         return []
@@ -154,34 +146,29 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
     if not isinstance(column, Column):
         return []
     plain, bent, _ = shapes_of(column, seen, curves=False)
-    near = [
-        structs.replace(effect, scale=share * effect.scale) for share in NEAR_SCALES if isinstance(effect, Proximity)
-    ]
-    return [
-        structs.replace(shape, response_range=(), **timing)
-        for shape in (*plain, *bent, *near)
-        if shape.seen({name: seen[:1]}).shape[1] == 1
-    ]
+    scales = [share * effect.scale for share in NEAR_SCALES] if isinstance(effect, Proximity) else []
+    shapes = (*plain, *bent, *(structs.replace(effect, scale=scale) for scale in scales))
+    single = (shape for shape in shapes if shape.seen({name: seen[:1]}).shape[1] == 1)
+    return [structs.replace(shape, response_range=(), **timing) for shape in single]
 
 
 def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
     """Responses at 1 Hz per time constant, shape (n, lags, k)."""
     coarse = fitted.coarse
-    late = [round(float(lag) / coarse.timeline.step) for lag in lags_about(effect.lag_s, NEAR_S, LAG_STEPS[-1])]
+    late = [
+        round(float(lag) / coarse.timeline.step)
+        for lag in refinement.lags_about(effect.lag_s, NEAR_S, refinement.LAG_STEPS[-1])
+    ]
     quantity = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=()))
-    sums = (running_sums(coarse, quantity, response_s) for response_s in FINE_RESPONSES)
-    return [np.stack([means_by_second(one, shift) for shift in late], axis=1) for one in sums]
+    sums = (refinement.running_sums(coarse, quantity, response_s) for response_s in refinement.FINE_RESPONSES)
+    return [np.stack([refinement.means_by_second(one, shift) for shift in late], axis=1) for one in sums]
 
 
 def _profile(rows: FloatArray, left: FloatArray, contrast: FloatArray) -> tuple[float, float, float]:
     """Squares explained, the contrast's size, and its variance for noise of variance 1."""
-    inverse = np.linalg.pinv(rows.T @ rows)
-    products = rows.T @ left
-    return (
-        float(products @ inverse @ products),
-        float(contrast @ inverse @ products),
-        float(contrast @ inverse @ contrast),
-    )
+    inverse, products = np.linalg.pinv(rows.T @ rows), rows.T @ left
+    explained, size = products @ inverse @ products, contrast @ inverse @ products
+    return float(explained), float(size), float(contrast @ inverse @ contrast)
 
 
 # ---- courses over time ----
@@ -205,7 +192,7 @@ class CourseTerm(MeanTerm):
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """The response at every delay, less its mean, shape (n, delays). [unit of the quantity]"""
-        moved = tents(coarse_mean(coarse.fine_response(self.effect))[:, 0], DELAYS, coarse.drive)
+        moved = tents(coarse_mean(coarse.fine_response(self.effect))[:, 0], coarse.drive)
         return np.asarray(moved - moved[coarse.valid].mean(axis=0))
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
@@ -242,45 +229,38 @@ class CourseTerm(MeanTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """One effect with a course; its weights' error as that of what they do in a typical passage."""
         sizes, covariance = self._weights(fitted)
-        weights = weights_of(DELAYS).T @ sizes
+        weights = KERNELS.T @ sizes
         total = max(float(np.abs(weights).sum()), 1e-300)
-        seconds = range(int(DELAYS[0]), int(DELAYS[-1]) + 1)
-        course = tuple((float(late), float(one / total)) for late, one in zip(seconds, weights, strict=True))
+        course = tuple((float(late), float(one / total)) for late, one in zip(SECONDS, weights, strict=True))
         sized = structs.replace(self.effect, course=course, response_range=())
         response = fitted.coarse.fine_response(sized)[fitted.coarse.timeline.valid]
-        passage = self._passage(fitted, sizes, covariance)
-        return (
-            structs.replace(
-                sized,
-                acts=Acts.LOCATION,
-                coefficients=(total,),
-                errors=(total * passage.share_of_error,),
-                reference=(float(response.mean()),),
-                response_range=((float(response.min()), float(response.max())),),
-            ),
+        effect = structs.replace(
+            sized,
+            acts=Acts.LOCATION,
+            coefficients=(total,),
+            errors=(total * self._passage(fitted, sizes, covariance).share_of_error,),
+            reference=(float(response.mean()),),
+            response_range=((float(response.min()), float(response.max())),),
         )
+        return (effect,)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """What the car does in a typical passage: the farthest that it goes."""
         passage = self._passage(fitted, *self._weights(fitted))
         described = super().describe(fitted, effects, key)
         size, error = passage.largest_shift
-        shape = f"{described.shape}, over time"
-        return replace(
-            described, shape=shape, size_m=size, size_error=error, lag_s=None, response_s=None, passage=passage
-        )
+        over_time = replace(described, shape=f"{described.shape}, over time", lag_s=None, response_s=None)
+        return replace(over_time, size_m=size, size_error=error, passage=passage)
 
     def _weights(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
         """Gain at each delay and its covariance, smooth as far as the rows leave it open. [m] per unit"""
         part = fitted.mean_part(self)
-        return penalised(fitted.sizes[part], fitted.covariance[part, part], smooth_covariance(len(DELAYS)))
+        return penalised(fitted.sizes[part], fitted.covariance[part, part], SMOOTH_COVARIANCE)
 
     def _passage(self, fitted: Fitted, sizes: FloatArray, covariance: FloatArray) -> Passage:
-        passage = typical_passage(fitted.coarse, self.effect)
-        quantity = coarse_mean(
-            self.effect.response(fitted.coarse.timeline.step, {self.effect.columns[0]: passage.column})
-        )
-        moved = tents(quantity[:, 0], DELAYS, np.zeros(len(quantity), dtype=np.intp))
+        passage, step = typical_passage(fitted.coarse, self.effect), fitted.coarse.timeline.step
+        quantity = coarse_mean(self.effect.response(step, {self.effect.columns[0]: passage.column}))
+        moved = tents(quantity[:, 0], np.zeros(len(quantity), dtype=np.intp))
         moved = moved - moved[0]
         error = np.sqrt(np.sum((moved @ covariance) * moved, axis=1))
         return replace(passage, path=moved @ sizes, error=error)

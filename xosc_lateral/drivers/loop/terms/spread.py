@@ -81,11 +81,6 @@ def known_log_scale(fitted: Fitted) -> FloatArray:
     return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)
 
 
-def what_columns_do(search: Search, fitted: Fitted) -> FloatArray:
-    """What columns that were found do to the movement's size, in any shape, shape (n, k)."""
-    return search.cross_basis(columns_on_size(fitted))
-
-
 def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
     """What the best other column may do to the movement's size, shape (n, k), and its p-value."""
     return ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)

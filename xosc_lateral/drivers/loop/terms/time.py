@@ -19,39 +19,14 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.loop import low_frequencies as low
 from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.low_frequencies import (
-    MEAN_SHORTEST_S,
-    ORDERS,
-    SAME_S,
-    SHORTEST_S,
-    SPREAD_ORDERS,
-    clock_range,
-    half_cosines_of,
-    low_frequencies,
-    mean_probability,
-    moment_of,
-    penalised,
-    slow_rows,
-    smooth_probabilities,
-    step_moments,
-    without_known,
-)
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
-from xosc_lateral.drivers.loop.terms.column import ColumnTerm
+from xosc_lateral.drivers.loop.terms import spread
+from xosc_lateral.drivers.loop.terms.column import ColumnTerm, columns_on_size
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.terms.spread import (
-    SLOW_S,
-    SpreadTerm,
-    fine_squares,
-    log_sizes,
-    quick_squares,
-    slow_squares,
-    what_a_column_may_do,
-    what_columns_do,
-)
 from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
 from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
@@ -61,7 +36,8 @@ STEP_PARAMETERS = 2  # Of a step: its height and its moment.
 SETTLING_S = (150.0, 300.0, 600.0, 1200.0)
 AS_LIKELY = float(np.log(20.0))  # A form so much less likely than the best, or less so, is not ruled out. [nat]
 CHANGE_WITH_TIME = "change of the mean with time"
-SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+# Where it is surer than the best column by this factor, what that column may do is left to time. [-]
+TIME_ADVANTAGE = 0.01
 
 
 class _MeanByTime(Term):
@@ -102,19 +78,19 @@ class StepTerm(_MeanByTime):
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
-        rows, whitener = slow_rows(fitted)
-        moments = step_moments(coarse)
+        rows, whitener = low.slow_rows(fitted)
+        moments = low.step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
-        waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
+        waves = whitener.rows(low.half_cosines_of(coarse, max(low.ORDERS)))
         slow, waves, jumps = (
-            low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
+            low.low_frequencies(one, coarse, coarse.valid, low.MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
         )
-        p_value = mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
+        p_value = low.mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
         if not len(moments):
             return Outcome(TimeMeanTerm(), (), p_value)
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
-        step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
-        smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
+        step = cls(low.moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
+        smooth = low.smooth_probabilities(slow[:, 0], waves, low.ORDERS)
         order = min(smooth, key=smooth.__getitem__)
         settling = [TimeMeanTerm(1, settling_s=seconds) for seconds in SETTLING_S]
         forms = {
@@ -132,7 +108,7 @@ class StepTerm(_MeanByTime):
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
-        return isinstance(other, StepTerm) and abs(self.at - other.at) <= SAME_S
+        return isinstance(other, StepTerm) and abs(self.at - other.at) <= low.SAME_S
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Height, moment, and the share of the drive before it: the mean stays."""
@@ -163,7 +139,7 @@ class TimeMeanTerm(_MeanByTime):
     """The mean is a smooth function of time; `StepTerm` tests both."""
 
     kind: ClassVar[str] = "drift"
-    order: int = max(ORDERS)  # Half cosines that it is made of.
+    order: int = max(low.ORDERS)  # Half cosines that it is made of.
     settling_s: float = 0.0  # Time constant of an exponential in their place; 0: none. [s]
     form: str = "smooth"
     others: tuple[str, ...] = ()  # Forms that are about as likely.
@@ -172,8 +148,8 @@ class TimeMeanTerm(_MeanByTime):
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, within -1..1, shape (n, order), or an exponential. [-]"""
         if self.settling_s:
-            return np.exp(-(coarse.time - clock_range(coarse)[0]).clip(0.0) / self.settling_s)[:, None]
-        return half_cosines_of(coarse, self.order)
+            return np.exp(-(coarse.time - low.clock_range(coarse)[0]).clip(0.0) / self.settling_s)[:, None]
+        return low.half_cosines_of(coarse, self.order)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Penalised sizes."""
@@ -210,7 +186,7 @@ class TimeSpreadTerm(Term):
     kind: ClassVar[str] = "scale"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     weight: ClassVar[float] = 2.0
-    order: int = max(ORDERS)  # Half cosines that it is made of.
+    order: int = max(low.ORDERS)  # Half cosines that it is made of.
     slow: bool = False  # Of the slower movement only.
     alike: Alternatives = ()
 
@@ -221,11 +197,11 @@ class TimeSpreadTerm(Term):
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, shape (n, order); none where only slow movement changes. [-]"""
-        return np.zeros((len(coarse), 0)) if self.slow else half_cosines_of(coarse, self.order)
+        return np.zeros((len(coarse), 0)) if self.slow else low.half_cosines_of(coarse, self.order)
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, shape (n, order), whichever movement changes. [-]"""
-        return half_cosines_of(coarse, self.order)
+        return low.half_cosines_of(coarse, self.order)
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
@@ -233,29 +209,31 @@ class TimeSpreadTerm(Term):
         if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
-        known = what_columns_do(search, fitted)
-        may_act, p_column = what_a_column_may_do(search, fitted)
-        columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
+        known = search.cross_basis(columns_on_size(fitted))
+        may_act, p_column = spread.what_a_column_may_do(search, fitted)
+        columns = low.half_cosines_of(fitted.coarse, max(low.SPREAD_ORDERS))
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             tested = []
-            for slow, squares in enumerate((quick_squares(fitted), slow_squares(fitted))):
-                rows, basis = without_known(known, squares.standardised, columns, squares.valid)
-                rows, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (rows, basis))
-                tests = smooth_probabilities(rows[:, 0], basis, SPREAD_ORDERS)
+            for slow, squares in enumerate((spread.quick_squares(fitted), spread.slow_squares(fitted))):
+                rows, basis = low.without_known(known, squares.standardised, columns, squares.valid)
+                rows, basis = (
+                    low.low_frequencies(one, fitted.coarse, squares.valid, low.SHORTEST_S) for one in (rows, basis)
+                )
+                tests = low.smooth_probabilities(rows[:, 0], basis, low.SPREAD_ORDERS)
                 tested += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None
 
         best = best_beside(known)
-        if best is not None and best[0] > SURER * p_column:
+        if best is not None and best[0] > TIME_ADVANTAGE * p_column:
             best = best_beside(np.concatenate([known, may_act], axis=1))
         if best is None:
             return None
         p_value, slow = best
         alike: Alternatives = ()
         if not slow and cls.passes(search, p_value, fitted):
-            by_time = max(_priced(fitted, cls(order), order) for order in SPREAD_ORDERS)
-            alike = _columns_as_likely(search, fitted, SpreadTerm, by_time)
+            by_time = max(_priced(fitted, cls(order), order) for order in low.SPREAD_ORDERS)
+            alike = _columns_as_likely(search, fitted, spread.SpreadTerm, by_time)
         return Outcome(cls(slow=slow, alike=alike), (), p_value)
 
     def matches(self, other: Self) -> bool:
@@ -265,15 +243,17 @@ class TimeSpreadTerm(Term):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Penalised sizes; the fine noise goes along as far as it does."""
         coarse = fitted.coarse
-        columns = half_cosines_of(coarse, self.order)
+        columns = low.half_cosines_of(coarse, self.order)
         if self.slow:
-            sizes, errors = log_sizes(slow_squares(fitted), columns)
-            sizes, errors = penalised_cosines(sizes, np.diag(np.square(errors) * SLOW_S))  # neighbouring sums overlap
+            sizes, errors = spread.log_sizes(spread.slow_squares(fitted), columns)
+            sizes, errors = penalised_cosines(
+                sizes, np.diag(np.square(errors) * spread.SLOW_S)
+            )  # neighbouring sums overlap
             fine = np.zeros(len(sizes))
         else:
             part = fitted.scale_part(self)
             sizes, errors = penalised_cosines(fitted.log_sizes[part], fitted.log_covariance[part, part])
-            fine, fine_errors = log_sizes(fine_squares(fitted), columns)
+            fine, fine_errors = spread.log_sizes(spread.fine_squares(fitted), columns)
             fine = penalised_cosines(fine, np.diag(np.square(fine_errors)))[0]
         return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
 
@@ -318,12 +298,12 @@ def _columns_as_likely(search: Search, fitted: Fitted, kind: type[ColumnTerm], b
 
 def penalised_cosines(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sizes of half cosines and their errors, shape (k,), given that rougher ones are smaller beforehand."""
-    estimates, known = penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
+    estimates, known = low.penalised(sizes, covariance, np.diag(np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0))
     return estimates, np.sqrt(np.diag(known))
 
 
 def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
-    from_s, to_s = clock_range(coarse)
+    from_s, to_s = low.clock_range(coarse)
     return TimeSmooth(from_s=from_s, to_s=to_s, **sizes)
 
 

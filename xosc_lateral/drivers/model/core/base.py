@@ -132,12 +132,7 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
         raise ValueError(f"rate: expected {n} finite values > 0")
     # Added up one by one from where the last call ended, so that pieces give the same sums as the whole.
     times = np.cumsum(np.concatenate([[state.time], steps]))
-    state.time = float(times[-1])
-    return _read(state, source, times[:-1])
-
-
-def _read(state: ClockState, source: Callable[[int], FloatArray], times: FloatArray) -> FloatArray:
-    """Values at times of the source, and a state that holds what later times need. Shape (n, drivers)."""
+    state.time, times = float(times[-1]), times[:-1]
     held = source(0) if state.held is None else state.held
     if not len(times):
         return held[:0]
@@ -159,11 +154,8 @@ def _read(state: ClockState, source: Callable[[int], FloatArray], times: FloatAr
 # ---- fine movement: uniform white noise shaped by a kernel, phi = R * k (arXiv:2405.17080, section III) ----
 # The amplitude spectrum of the measured fine part, relative to that of the noise, is approximated by a piecewise linear
 # damping function over frequency; its inverse transform is the kernel.
-N_KNOTS = 11
-"""Knots of the damping function, evenly from 0 to half the sampling rate. [-]"""
-
-KERNEL_TAPS = 51
-"""Taps of the kernel (odd): 10 s at 5 Hz, one snippet. [-]"""
+N_KNOTS, KERNEL_TAPS = 11, 51
+"""Knots of the damping function, and taps of the kernel (odd): 10 s at 5 Hz, one snippet. [-]"""
 
 
 class ShapedNoise(Record, frozen=True, eq=False, dict=True):

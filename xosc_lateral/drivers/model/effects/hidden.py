@@ -17,10 +17,11 @@ References
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import DriverProfileError
@@ -167,24 +168,14 @@ class VarianceTrend(HiddenEffect, frozen=True, kw_only=True):
 
 class TimeSmooth(HiddenEffect, frozen=True, kw_only=True):
     """Mean, spread and fine noise change with time as they did; before and after the fitted time the outermost value
-    holds.
-
-    Parameters
-    ----------
-    location, location_errors : tuple of float
-        Size of the k-th half cosine of the mean offset and its standard error, k = 1, 2, ... [m]
-    spread, spread_errors, fine : tuple of float
-        The same of the natural logarithm of the spread, and of the fine noise.
-    from_s, to_s : float
-        Time that it was fitted on, in the drive's clock. [s]
-    """
+    holds. By sizes of the k-th half cosine, k = 1, 2, ..., of the mean offset [m] and of logarithms [-]."""
 
     location: tuple[float, ...] = ()
     location_errors: tuple[float, ...] = ()
     spread: tuple[float, ...] = ()
     spread_errors: tuple[float, ...] = ()
     fine: tuple[float, ...] = ()
-    from_s: float = 0.0
+    from_s: Annotated[float, Meta(description="Time that it was fitted on, in the drive's clock. [s]")] = 0.0
     to_s: float = 3600.0
 
     def __post_init__(self) -> None:

@@ -82,7 +82,11 @@ class Response:
         if until == state.given + 1:
             response = self._single(state.held, state.given)
         else:
-            response = self._lagged(self._shifted(state.held, state.given, until))
+            parts = (
+                (weight, self._rows(state.held, state.given + whole, until + whole, share))
+                for whole, share, weight in self._shifts
+            )
+            response = self._lagged(np.asarray(reduce(add, (weight * rows for weight, rows in parts))))
         state.given = until
         done = min(until + self._earliest, state.taken - 1) - (state.taken - len(state.held))
         if done > 0:
@@ -107,13 +111,6 @@ class Response:
             return np.asarray(held[-1])
         at -= self.state.taken - len(held)
         return np.asarray(held[at] if not share else held[at] * (1.0 - share) + share * held[at + 1])
-
-    def _shifted(self, held: FloatArray, first: int, until: int) -> FloatArray:
-        """Rows `first` to `until` of the shifted quantity, as an array of its own."""
-        parts = (
-            (weight, self._rows(held, first + whole, until + whole, share)) for whole, share, weight in self._shifts
-        )
-        return np.asarray(reduce(add, (weight * rows for weight, rows in parts)))
 
     def _rows(self, held: FloatArray, begin: int, end: int, share: float) -> FloatArray:
         """Rows `begin` to `end` of the quantity, each `share` of a step later, as an array of its own."""

@@ -12,9 +12,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from itertools import pairwise
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
+from msgspec import Meta
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
@@ -87,21 +88,11 @@ class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
 
 
 class Threshold(SingleColumnEffect, frozen=True, kw_only=True):
-    """Acts beyond a limit only; NaN counts as on the side that does not act.
+    """Acts beyond a limit only; NaN counts as on the side that does not act."""
 
-    Parameters
-    ----------
-    at : float
-        The limit. [unit of the column]
-    above : bool
-        Whether it acts above the limit, or below.
-    jump : bool
-        True: as a whole at once; False: in proportion to the distance from the limit.
-    """
-
-    at: float
-    above: bool = True
-    jump: bool = True
+    at: Annotated[float, Meta(description="The limit. [unit of the column]")]
+    above: Annotated[bool, Meta(description="Whether it acts above the limit, or below.")] = True
+    jump: Annotated[bool, Meta(description="As a whole at once; else in proportion to the distance beyond.")] = True
 
     @property
     def levels_off(self) -> bool:

@@ -11,9 +11,9 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError, PlaybackError
-from xosc_lateral.files.openscenario.declarations import final, parameter_name
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.provenance import refuse_converted
+from xosc_lateral.files.openscenario.references import final, parameter_name
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import Version, Vertices, named
 from xosc_lateral.files.xml import parse_xml, read_document

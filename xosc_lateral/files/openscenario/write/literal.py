@@ -11,8 +11,8 @@ from pathlib import Path
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.declarations import NAMES, entry_scope, local_scope
 from xosc_lateral.files.openscenario.element import XmlElement, children_of, elements, local_name, parent_of
+from xosc_lateral.files.openscenario.references import NAMES, entry_scope, local_scope
 from xosc_lateral.files.openscenario.write.draft import Draft, unchanged
 from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope

@@ -9,8 +9,9 @@ from typing import NoReturn
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.element import line_of, local_name
+from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.xml import line_of
 
 MOTION = frozenset({"LongitudinalAction", "LateralAction", "SynchronizeAction", "TeleportAction", "RoutingAction"})
 """Private actions that move an entity."""

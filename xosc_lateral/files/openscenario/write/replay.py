@@ -8,9 +8,9 @@ from contextlib import suppress
 
 from lxml import etree
 
-from xosc_lateral.files.openscenario.actions import GROUPING
-from xosc_lateral.files.openscenario.declarations import NAMES, final
 from xosc_lateral.files.openscenario.element import at_node, child_of, children_of, elements, local_name
+from xosc_lateral.files.openscenario.references import NAMES, final
+from xosc_lateral.files.openscenario.storyboard import GROUPING
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.carla import add_drives, start_of
 from xosc_lateral.files.openscenario.write.draft import Draft, Player, source_of

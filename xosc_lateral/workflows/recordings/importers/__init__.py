@@ -30,10 +30,10 @@ from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.workflows.options import declare_options
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
-Sources: TypeAlias = Path | Sequence[Path]
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
 
@@ -164,7 +164,7 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
     return ImportedDrives(table, record)
 
 
-def paths_of(sources: Sources) -> list[Path]:
+def paths_of(sources: Path | Sequence[Path]) -> list[Path]:
     """One or several."""
     return [sources] if isinstance(sources, Path) else list(sources)
 
@@ -190,11 +190,13 @@ def import_each(files: Sequence[Path], read: Callable[[Path, str], ImportedDrive
 
 
 def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrives]:
-    """Without the rows that are cut, unless they are kept (`keep_cut`); a source, however damaged, ends in one line
-    that names it, never in a table of nonsense."""
+    """Options that annotations declare; without the rows that are cut, unless they are kept (`keep_cut`).
 
-    @wraps(read)
-    def within(source: Sources, *args: Any, keep_cut: bool = False, **settings: Any) -> ImportedDrives:
+    A source, however damaged, ends in one line that names it, never in a table of nonsense.
+    """
+
+    @wraps(declare_options(read))
+    def within(source: Path | Sequence[Path], *args: Any, keep_cut: bool = False, **settings: Any) -> ImportedDrives:
         path = paths_of(source)[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
             try:

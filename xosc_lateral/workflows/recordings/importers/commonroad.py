@@ -10,6 +10,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
 from xosc_lateral.workflows.recordings.importers.tracks import (
     LaneShape,
@@ -36,8 +37,8 @@ LICENCE = "that of the CommonRoad scenario and of the recording that it was made
 
 
 @importer
-def import_commonroad(sources: Sources, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
-    """Read one or several scenarios. Raises `FormatError`, `NotEnoughDataError`."""
+def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
+    """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
 
     def read(path: Path, label: str) -> ImportedDrives:
         tracks, shapes, graph, version = read_obstacles(path, label)

@@ -23,8 +23,9 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,15 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
 from xosc_lateral.files.source import open_source
-from xosc_lateral.workflows.recordings import cuts
+from xosc_lateral.workflows.options import flag
+from xosc_lateral.workflows.recordings.cuts import (
+    DEFAULT_CUTS,
+    CutSettings,
+    lane_changes,
+    long_gaps,
+    name_states,
+    number_runs,
+)
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
@@ -63,8 +72,16 @@ LICENCE = (
 
 
 @importer
-def import_dlr_ht(source: Path, settings: cuts.CutSettings = cuts.DEFAULT_CUTS) -> ImportedDrives:
-    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it."""
+def import_dlr_ht(
+    source: Path,
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    max_gap: Annotated[
+        float, flag(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
+    ] = DEFAULT_CUTS.max_gap,
+) -> ImportedDrives:
+    """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
+    settings = replace(settings, max_gap=max_gap) if settings is DEFAULT_CUTS else settings
     tracks = read_tracks(source)
     road, kind = find_lanes(tracks, settings), vehicle_classes(tracks)
     vehicle, time, length = (tracks[name].to_numpy() for name in ("vehicle", "time", "dimension_length"))
@@ -91,8 +108,8 @@ def import_dlr_ht(source: Path, settings: cuts.CutSettings = cuts.DEFAULT_CUTS) 
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     table[VALID_BELOW], table[RESOLUTION] = HIGHEST_FREQUENCY, POSITION_RESOLUTION
     reasons = {"no lane": road.lane < 0, "lane change": road.changing, "gap": road.gap}
-    table["state"] = cuts.name_states(reasons, road.lane, vehicle, time, STEP, settings)
-    table[RUN] = cuts.number_runs(table["state"].to_numpy(), road.lane, vehicle, time)
+    table["state"] = name_states(reasons, road.lane, vehicle, time, STEP, settings)
+    table[RUN] = number_runs(table["state"].to_numpy(), road.lane, vehicle, time)
     lanes = []
     for carriageway, both in road.lanes.items():
         for index, lane in enumerate(both):
@@ -181,7 +198,7 @@ class Carriageways:
     lanes: dict[str, list[LaneCentreLine]]
 
 
-def find_lanes(tracks: pd.DataFrame, settings: cuts.CutSettings = cuts.DEFAULT_CUTS) -> Carriageways:
+def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Carriageways:
     """Lanes out of nothing but the tracks; "northbound" ones along the reference line, "southbound" ones against it."""
     forward = travels_north(tracks)
     reference, s_road, d_road = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
@@ -190,7 +207,7 @@ def find_lanes(tracks: pd.DataFrame, settings: cuts.CutSettings = cuts.DEFAULT_C
     s = np.where(forward, s_road, reference.length - s_road)
     d = np.where(forward, d_road, -d_road)
     vehicle, height = tracks["vehicle"].to_numpy(), tracks["dimension_height"].to_numpy()
-    gap, n = cuts.long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap), len(tracks)
+    gap, n = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap), len(tracks)
     places = np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_)
     lanes: dict[str, list[LaneCentreLine]] = {}
     for name, part in (("northbound", forward), ("southbound", ~forward)):
@@ -210,7 +227,7 @@ def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
 
 
 def _place_in_lanes(
-    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: BoolArray, settings: cuts.CutSettings
+    s: FloatArray, d: FloatArray, height: FloatArray, vehicle: IntArray, gap: BoolArray, settings: CutSettings
 ) -> tuple[list[LaneCentreLine], IntArray, FloatArray, float, BoolArray]:
     """Lane centres of one carriageway, and every row's lane, offset, width and lane change: each needs the others."""
     levels = _levels(d)
@@ -222,7 +239,7 @@ def _place_in_lanes(
         # Between two lanes the midpoint decides; towards the outside half a width does.
         lane = np.where(away.min(axis=0) <= width * 0.55, away.argmin(axis=0), -1)
         offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
-        changing = cuts.lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
+        changing = lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
         if not remaining:
             break
         lanes = []

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files import sumo
 from xosc_lateral.files.columns import require_row_step
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks
@@ -36,12 +37,16 @@ REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the le
 
 @importer
 def import_fcd(
-    source: Path, *, net: str | Path | None = None, types: str | Path | None = None, lane_width: float = sumo.LANE_WIDTH
-) -> ImportedDrives:
-    """A drive for every vehicle of what ``--fcd-output`` wrote; it is a truck when its type's name or class says so.
+    source: Path, *,
+    net: Annotated[str | Path | None, flag(kind=Path | None,
+        help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")] = None,
+    types: Annotated[str | Path | None, flag(kind=Path | None,
+        help="File with the vehicle types (.rou.xml): lengths.")] = None,
+    lane_width: Annotated[float, flag(help="Without a network. [m]", min=1, max=10)] = sumo.LANE_WIDTH,
+) -> ImportedDrives:  # fmt: skip
+    """SUMO's FCD output of a run with the sublane model: a drive for every vehicle.
 
-    `net`: the road network, ``.net.xml``, for widths and counts of lanes, and for who is on the next edge. `types`:
-    file with the vehicle types, for lengths. `lane_width`: without a network. [m]
+    It is a truck when its type's name or class says so.
     """
     vehicles = sumo.fcd_vehicles(source, "a vehicle outside a timestep")
     known = None if net is None else sumo.read_sumo_net(Path(net))

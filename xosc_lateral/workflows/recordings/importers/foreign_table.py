@@ -16,7 +16,7 @@ from xosc_lateral.files.columns import comma_numbers
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
 from xosc_lateral.files.tables import read_table, text_encoding
-from xosc_lateral.workflows.recordings.importers import Sources, paths_of
+from xosc_lateral.workflows.recordings.importers import paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -74,7 +74,7 @@ LISTED_TEXTS = 12  # so many different texts are written out at most
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
 
-def import_table(sources: Sources, *, mapping: MappingLike | None = None) -> pd.DataFrame:
+def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
     """Tables under standard names and units, as they can be read; without `drive`, a drive called after its file."""
     known = as_mapping(mapping)
     files = paths_of(sources)

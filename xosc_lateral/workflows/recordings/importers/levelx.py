@@ -49,7 +49,7 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 @importer
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them, of highD or exiD, told by their columns."""
+    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +33,16 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cuts import JUMP, MAX_GAP
+from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
 from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -95,12 +96,17 @@ class Channel:
 
 @importer
 def import_mf4(
-    sources: Sources, channels: Sequence[str] = (), *, step: float = 0.04, mapping: MappingLike | None = None
-) -> ImportedDrives:
-    """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
+    sources: Path | Sequence[Path],
+    channels: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=CHANNEL[:UNIT]",
+        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (), *,
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    step: Annotated[float, flag(help="Time step of the table, to which channels are interpolated [s].", min=0.001,
+        max=1)] = 0.04,
+) -> ImportedDrives:  # fmt: skip
+    """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car.
 
-    Each log is a drive called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``; `mapping`: more of them,
-    saved. `step`: of the table [s]. Messages that stay away for longer than `fit` bridges leave a gap.
+    Mapped channels are read at an even step, over the time that all position channels of a log cover. Each log is a
+    drive called after its file. Messages that stay away for longer than `fit` bridges leave a gap.
     """
     files, saved = paths_of(sources), as_mapping(mapping)
     wanted = {**saved.columns, **parse_map(channels)}
@@ -267,14 +273,13 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
     sides = ("lane_width",) if "lane_width" in signals else POSITIONS[1]
     width = sum(float(np.median(signals[name].values)) for name in sides)
-    jumps = {name: JUMP * width for name in position if name != "lane_width"}
-    columns = {
-        name: channel.at(time, channel.breaks(jumps.get(name, np.inf)), is_position=name in position)
-        for name, channel in signals.items()
-    }
+    columns: dict[str, NDArray[Any]] = {}
+    for name, channel in signals.items():
+        broken = channel.breaks(LANE_JUMP_SHARE * width if name in position and name != "lane_width" else np.inf)
+        columns[name] = channel.at(time, broken, is_position=name in position)
     unknown = np.any([np.isnan(columns[name]) for name in position], axis=0)
     if "distance_left" in position:  # one side has jumped, the other not yet
-        unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > JUMP * width
+        unknown |= np.abs(columns["distance_left"] + columns["distance_right"] - width) > LANE_JUMP_SHARE * width
     state = np.where(unknown, "gap", KEPT_ROWS)
     if "speed" in columns:
         state = np.where((state == KEPT_ROWS) & np.isnan(columns["speed"]), "no speed", state)

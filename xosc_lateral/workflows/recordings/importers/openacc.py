@@ -23,6 +23,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -33,8 +34,9 @@ from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, imported, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer, paths_of
 
 LICENCE = (
     "OpenACC, AstaZero campaign: (c) European Union, Joint Research Centre, CC BY 4.0 (doi:10.1016/j.trc.2021.103047). "
@@ -59,8 +61,12 @@ HEADER_LINES = 50  # lines before the header, at most: the campaign's files have
 
 
 @importer
-def import_openacc(source: Sources, *, lane_width: float = LANE_WIDTH) -> ImportedDrives:
-    """A drive for each car of AstaZero's files (.csv, .csv.gz). `lane_width`: of the road, not measured. [m]"""
+def import_openacc(
+    source: Path | Sequence[Path],
+    *,
+    lane_width: Annotated[float, flag(help="Of the road, which the files don't give. [m]", min=2, max=6)] = LANE_WIDTH,
+) -> ImportedDrives:
+    """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
     paths = paths_of(source)
     cars = [car for path in paths for car in _cars(path)]
     if not cars:

@@ -10,19 +10,20 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.opendrive import parse_opendrive, read_opendrive
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
-from xosc_lateral.workflows.recordings.importers import ImportedDrives, Sources, import_each, importer, paths_of
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.tracks import (
     Strip,
     graph_of_shapes,
@@ -41,18 +42,16 @@ HOST = "host"  # stands for the trace's own host vehicle
 
 @importer
 def import_osi(
-    sources: Sources,
+    sources: Path | Sequence[Path],
     settings: CutSettings = DEFAULT_CUTS,
     *,
-    host: str | None = None,
-    road: Path | str | None = None,
-    channel: str | None = None,
-) -> ImportedDrives:
-    """Read one or several traces of ground truth or sensor views.
-
-    `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
-    OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
-    """
+    host: Annotated[str | None, flag("--host", metavar="ID",
+        help="Keep this vehicle alone: its id or name; host: the host vehicle.")] = None,
+    road: Annotated[Path | str | None, flag("--road", kind=Path | None, metavar="FILE.xodr",
+        help="Take lanes from here, not from the trace.")] = None,
+    channel: Annotated[str | None, flag("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
+) -> ImportedDrives:  # fmt: skip
+    """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
     files = paths_of(sources)
 
     def read(path: Path, label: str) -> ImportedDrives:

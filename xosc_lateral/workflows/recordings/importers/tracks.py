@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,8 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.mapping import MappingLike
-from xosc_lateral.files.opendrive import read_opendrive
+from xosc_lateral.files.opendrive.reader import read_opendrive
+from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import (
     DEFAULT_CUTS,
     LANE_AGREEMENT,
@@ -62,18 +63,17 @@ class PlacedTracks:
 
 @importer
 def import_tracks(
-    source: Path,
-    *,
-    road: Path | str,
-    columns: Sequence[str] = (),
-    mapping: MappingLike | None = None,
+    source: Path, *,
+    road: Annotated[Path | str, flag("--road", kind=Path, metavar="FILE.xodr", help="Road on which the tracks lie.")],
+    columns: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=COLUMN[:UNIT]",
+        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
+    mapping: Annotated[MappingLike | None, MAPPING] = None,
     settings: CutSettings = DEFAULT_CUTS,
-) -> ImportedDrives:
-    """Read tracks on a known road, an OpenDRIVE file.
+) -> ImportedDrives:  # fmt: skip
+    """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
 
     `source`: table of one row per vehicle and instant, or a log of esmini (``--csv_logger``); x and y are the vehicle's
-    middle, or lie `rear` behind it, in the road's coordinates. `columns`: ``NAME=COLUMN[:UNIT]``; `mapping`: more,
-    saved.
+    middle, or lie `rear` behind it, in the road's coordinates.
     """
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)

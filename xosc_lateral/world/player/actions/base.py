@@ -16,7 +16,7 @@ from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 from xosc_lateral.world.scenario.enums import StoryboardElementType
 from xosc_lateral.world.scenario.scenario import Action
 
-JUMP = 0.05
+JUMP_DISTANCE = 0.05
 """When an action puts the entity further away than this at once, the entity's motion is not continuous. [m]"""
 
 
@@ -30,12 +30,10 @@ class Domain(IntFlag):
 
 
 class RunningAction(StoryboardElement):
-    """One action of one actor (or of none): a leaf of the storyboard.
+    """One action of one actor (an `EntityState`), or of none: a leaf of the storyboard.
 
     A kind of action says what it does in `_prepare`, `_begin`, `_act` and `_finish`; one that has done its work calls
     `end`.
-
-    `source`: as read; `actor`: who acts (an `EntityState`); None for global and user-defined actions.
     """
 
     domains: Domain = Domain.NONE
@@ -154,7 +152,7 @@ class RunningPrivateAction(RunningAction):
 
     def _jumped(self, distance: float) -> None:
         """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
-        if abs(distance) > JUMP:
+        if abs(distance) > JUMP_DISTANCE:
             self.actor.activity |= Activity.TELEPORTED
 
 

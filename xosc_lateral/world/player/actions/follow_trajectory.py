@@ -80,7 +80,6 @@ class RunningFollowTrajectory(RunningPrivateAction):
     def _finish(self) -> None:
         self.actor.path = None
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     @property
     def _clock(self) -> float:
         """Time of the path's own clock. [s]"""

@@ -72,7 +72,6 @@ class RunningLaneChange(RunningToTarget):
         elif guide.at_road_end:
             self.end()
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target_lane(self) -> int:
         target = self.content.target
         if isinstance(target, AbsoluteTargetLane):

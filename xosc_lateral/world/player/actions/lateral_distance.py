@@ -10,6 +10,7 @@ from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
+from xosc_lateral.world.player.actions.longitudinal import STIFFNESS
 from xosc_lateral.world.player.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.world.player.drive import move_along_lane
 from xosc_lateral.world.player.state import NO_ROAD, EntityState, free
@@ -17,9 +18,6 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import Pose, difference
 from xosc_lateral.world.scenario.enums import CoordinateSystem, LateralDisplacement
 from xosc_lateral.world.scenario.private_actions import DynamicConstraints, LateralDistanceAction
-
-STIFFNESS = 0.4
-"""Of the spring that pulls towards the distance, per acceleration available. [1/m]"""
 
 
 class BesideOnRoad:
@@ -84,7 +82,6 @@ class BesideOnRoad:
         if self.is_unlimited:
             self._state.turn(0.0 if self._state.is_forward else pi)
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _rest(self) -> float:
         """How far to go along +t of the own road. [m]"""
         state, other = self._state, self._other
@@ -137,7 +134,7 @@ MOST_ACCELERATION = 1000.0
 LEAST_RADIUS = 0.5
 """Of a turn towards the line. [m]"""
 
-PEAK = 1.5
+PEAK_CURVATURE_RATIO = 1.5
 """A turn with a smooth course has this much more curvature in its middle than a circle. [-]"""
 
 
@@ -183,10 +180,10 @@ class BesideEntity:
     def _heading(self, heading: float, other: float, delta: tuple[float, float], rest: float, step: float) -> float:
         speed = self._state.speed
         way = speed * step
-        radius = max(LEAST_RADIUS, PEAK * speed * speed / min(self._acceleration, MOST_ACCELERATION))
+        radius = max(LEAST_RADIUS, PEAK_CURVATURE_RATIO * speed * speed / min(self._acceleration, MOST_ACCELERATION))
         if rest < 0.5 * way - EPSILON and 0.5 * way > radius - EPSILON:
             return _onto_line(other, delta, way)
-        most = min(abs(speed / radius * step) * PEAK, pi - EPSILON)
+        most = min(abs(speed / radius * step) * PEAK_CURVATURE_RATIO, pi - EPSILON)
         towards = difference(atan2(delta[1], delta[0]), heading)
         if rest > radius - EPSILON:
             turn = towards

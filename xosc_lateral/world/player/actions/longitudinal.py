@@ -50,7 +50,6 @@ class RunningSpeed(RunningToTarget):
         if self._reached and not getattr(self.content.target, "continuous", False):
             self.end()
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _target(self) -> float:
         target = self.content.target
         if self._reference is None or isinstance(target, private_actions.AbsoluteTargetSpeed):
@@ -158,7 +157,6 @@ class RunningLongitudinalDistance(RunningPrivateAction):
         speed = state.speed + self._acceleration * step
         state.set_speed(min(max(speed, -limits.max_speed), limits.max_speed))
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _is_ahead(self) -> bool:
         """Whether the other one is ahead; with free space also while it is alongside."""
         if self.content.freespace:

@@ -205,7 +205,6 @@ class RunningSpeedProfile(RunningPrivateAction):
         if done:
             self.end()
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _targets(self, offset: float, limits: Performance) -> list[Piece]:
         """Speeds at absolute times, the present one first unless the first entry is to hold now."""
         time, speed = self.simulation.time, self.actor.speed

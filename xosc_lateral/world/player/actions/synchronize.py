@@ -93,7 +93,6 @@ class RunningSynchronize(RunningPrivateAction):
             acceleration = 2.0 * (mean - state.speed) / time_left
             state.speed += acceleration * step
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _way_to(self, entity: EntityState, spot: Spot, position: Position) -> float:
         """Left on the trajectory, else along the road, else straight; negative: the entity has it in its back. [m]"""
         if entity.path is not None:

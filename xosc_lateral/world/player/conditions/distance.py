@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from math import copysign, hypot
 
-from xosc_lateral.world.player.boxes import overlap
-from xosc_lateral.world.player.distances import Measure, Spot, apart, free_road_gap, road_gap, spot_of
+from xosc_lateral.world.player.distances import Measure, Spot, apart, free_road_gap, overlap, road_gap, spot_of
 from xosc_lateral.world.player.positions.resolve import pose_of, spot_at
-from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.simulation import Simulation, holds
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.player.values import holds
 from xosc_lateral.world.road.lanes import DRIVING, lanes_between
 from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario import conditions

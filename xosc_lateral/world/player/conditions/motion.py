@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from math import copysign, hypot, pi
 
-from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.simulation import Simulation, holds
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.storyboard import EntityCheck, EntityChecks
 from xosc_lateral.world.player.transition import EPSILON
-from xosc_lateral.world.player.values import holds
 from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import AngleType, CoordinateSystem, DirectionalDimension

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.player.simulation import Simulation, holds
 from xosc_lateral.world.player.storyboard import Check, Checks, StoryboardElement, Watch
-from xosc_lateral.world.player.values import holds
 from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 

@@ -13,10 +13,7 @@ from xosc_lateral.world.player.transition import EPSILON
 
 
 class PathPoint(NamedTuple):
-    """A place on a path: [m], [rad]; NaN: as the road there.
-
-    `tangent` is the direction of the path itself; `is_headed` tells whether the file gives the heading here.
-    """
+    """A place on a path: [m], [rad]; NaN: as the road there."""
 
     x: float
     y: float
@@ -24,8 +21,8 @@ class PathPoint(NamedTuple):
     heading: float
     pitch: float
     roll: float
-    tangent: float
-    is_headed: bool = False
+    tangent: float  # direction of the path itself
+    is_headed: bool = False  # the file gives the heading here
 
 
 class Path:

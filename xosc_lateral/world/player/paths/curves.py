@@ -23,7 +23,7 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.geometry import Spiral
 from xosc_lateral.world.road.positions import wrap
 
-SAMPLE = 1.0
+SAMPLE_LENGTH = 1.0
 """Length of the control polygon per sample. [m]"""
 
 MOST_SAMPLES = 20_000
@@ -43,11 +43,7 @@ class Control(Struct, frozen=True):
 
 
 class NurbsPath(Path):
-    """A NURBS curve of order `order` (degree + 1).
-
-    `controls`: at least `order`; `knots`: as many as control points and order together, none smaller than the one
-    before, spanning a curve.
-    """
+    """A NURBS curve of an order (degree + 1), with as many knots as control points and order together."""
 
     def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:
         from scipy.interpolate import BSpline  # takes a while to import, and few scenarios have a curve
@@ -73,7 +69,6 @@ class NurbsPath(Path):
         curve = self._curve(self._inside(parameters))
         return np.asarray(curve[:, :2] / curve[:, 2:])
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _inside(self, parameters: FloatArray) -> FloatArray:
         """Within the knots between which shares sum to 1 (an unclamped curve begins after its first knot)."""
         first, last = self._knots[self._degree], self._knots[len(self.controls)]
@@ -81,7 +76,7 @@ class NurbsPath(Path):
 
     def _sample(self) -> tuple[FloatArray, PolylinePath]:
         polygon = sum(hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(self.controls))
-        steps = min(int(1 + polygon / SAMPLE), MOST_SAMPLES)
+        steps = min(int(1 + polygon / SAMPLE_LENGTH), MOST_SAMPLES)
         step = float(self._knots[-1]) / steps
         parameters = np.arange(steps + 1, dtype=np.float64) * step
         places = self.points(parameters)

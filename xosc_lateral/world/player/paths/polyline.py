@@ -22,24 +22,18 @@ from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import difference, wrap
 
-CORNER = 2.0
+CORNER_LENGTH = 2.0
 """Around a corner, the heading turns over this length before and after it (or half the piece). [m]"""
 
 SAME_HEADING = 0.1
 """Headings that differ by less count as one. [rad]"""
 
-STOP = 1.0
+STOP_DURATION = 1.0
 """A stop that is shorter is driven through where its vertices are merged. [s]"""
 
 
 class Corner(Struct, frozen=True):
-    """A vertex: [m], [rad], [s].
-
-    NaN in `heading` and `pitch`: the pieces'; in `z` and `roll`: the road's; in `time`: none.
-
-    `road_z` is the height of the road here, for a piece that begins on it and ends above; `is_fixed` tells whether the
-    vertex has a place of its own, not one relative to an entity.
-    """
+    """A vertex [m], [rad], [s]; NaN: heading and pitch of the pieces, z and roll of the road, no time."""
 
     x: float
     y: float
@@ -48,16 +42,12 @@ class Corner(Struct, frozen=True):
     pitch: float = nan
     roll: float = nan
     time: float = nan
-    road_z: float = nan
-    is_fixed: bool = True
+    road_z: float = nan  # height of the road here, for a piece that begins on it and ends above
+    is_fixed: bool = True  # it has a place of its own, not one relative to an entity
 
 
 class PolylinePath(Path):
-    """A polyline.
-
-    `corners`: at least one; `follow`: follow mode, else position mode; `initial_speed`: with which the entity comes
-    (follow mode needs it). [m/s]
-    """
+    """A polyline in follow mode (the entity comes with `initial_speed` [m/s]) or in position mode."""
 
     def __init__(self, corners: Sequence[Corner], *, follow: bool = False, initial_speed: float = 0.0) -> None:
         self.corners = _lifted(corners)
@@ -109,7 +99,6 @@ class PolylinePath(Path):
         following = self._speeds[i + 1] if self.follow or i + 2 < len(self.corners) else 0.0
         return self._speeds[i] + u * (following - self._speeds[i])
 
-    # ---- in detail ---------------------------------------------------------------------------------------------------
     def _angle(self, angles: tuple[float, ...], i: int, u: float) -> float:
         if i == len(angles) - 1:
             return angles[i]
@@ -119,7 +108,7 @@ class PolylinePath(Path):
 
     def _around_corners(self, headings: tuple[float, ...], i: int, along: float) -> float:
         length = self.spans[i]
-        radius = max(min(CORNER, 0.5 * length), EPSILON)
+        radius = max(min(CORNER_LENGTH, 0.5 * length), EPSILON)
         here = headings[i]
         if along < radius:
             if i == 0:
@@ -182,7 +171,7 @@ def merge_close(corners: Sequence[Corner], radius: float) -> tuple[Corner, ...]:
 
     The reference player does so, and its logs can't be met otherwise. The first and the last corner stay. Of a run of
     corners within `radius` [m] (and `SAME_HEADING`) of the first of them, that one alone is kept, or, when the next
-    corner beyond comes `STOP` later or more, that one twice: with its own time and with the last of the run.
+    corner beyond comes `STOP_DURATION` later or more, that one twice: with its own time and with the last of the run.
     """
     if len(corners) <= 2:
         return tuple(corners)
@@ -200,7 +189,7 @@ def merge_close(corners: Sequence[Corner], radius: float) -> tuple[Corner, ...]:
             i = last
             break
         beyond = corners[last + 1]
-        if beyond.time - first.time >= STOP + EPSILON:
+        if beyond.time - first.time >= STOP_DURATION + EPSILON:
             kept.append(replace(first, time=corners[last].time))
         kept.append(beyond)
         i = last + 2

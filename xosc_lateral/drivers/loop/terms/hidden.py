@@ -1,7 +1,7 @@
-"""Loud and quiet stretches that no column tells apart: distraction, say.
+"""What no column explains: loud and quiet stretches, as by distraction, and a cycle of the mean.
 
-A two-state Markov chain [1]_. The null is a movement that is loud or quiet for no longer than `CLUSTER_S`: its own
-squares, in blocks of that length, in random order [2]_.
+Regimes are a two-state Markov chain [1]_. Their null is a movement that is loud or quiet for no longer than
+`CLUSTER_S`: its own squares, in blocks of that length, in random order [2]_. A cycle is a line of the spectrum [3]_.
 
 References
 ----------
@@ -10,13 +10,14 @@ References
 .. [2] E. Carlstein, "The use of subseries values for estimating the variance of a general statistic from a stationary
        sequence", Annals of Statistics 14, 1986: blocks that do not overlap. Dealt without replacement: a permutation
        test, of blocks that are taken for exchangeable.
+.. [3] E. J. Hannan, "The estimation of frequency", J. Applied Probability 10, 1973.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -24,19 +25,12 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
-from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
-from xosc_lateral.drivers.loop.terms.spread import (
-    SLOW_S,
-    fine_squares,
-    known_log_scale,
-    log_sizes,
-    quick_squares,
-    slow_squares,
-    what_a_column_may_do,
-    what_columns_do,
-)
-from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
-from xosc_lateral.drivers.model.effects import Acts, Effect, Regimes
+from xosc_lateral.drivers.loop.residual import OSCILLATION
+from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, MINIMUM_P, LoopSeed, in_another_order, upper_tail
+from xosc_lateral.drivers.loop.terms import spread
+from xosc_lateral.drivers.loop.terms.column import columns_on_size
+from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse, on_fine_grid
+from xosc_lateral.drivers.model.effects import Acts, Cycle, Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
 
 
@@ -116,7 +110,7 @@ MEMORIES_S = (6.0, 15.0, 40.0)  # Lengths of regimes that are tested. [s]
 # and no regime. [s]
 CLUSTER_S = 15
 SHORTEST_S = 12  # Lags are compared from here on. [s]
-DRAWS = 2000  # Orders of the blocks that are the null.
+BLOCK_ORDERS = 2000  # Orders of the blocks that are the null.
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +136,9 @@ class RegimesTerm(Term):
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
-        columns = what_columns_do(search, fitted), what_a_column_may_do(search, fitted)[0]
-        known = np.concatenate([known_log_scale(fitted), *columns], axis=1)
-        squares, rng = quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
+        columns = search.cross_basis(columns_on_size(fitted)), spread.what_a_column_may_do(search, fitted)[0]
+        known = np.concatenate([spread.known_log_scale(fitted), *columns], axis=1)
+        squares, rng = spread.quick_squares(fitted).standardised, generator(search.seed, LoopSeed.REGIMES)
         p_value = probability_of_persistence(squares, coarse.valid, known, rng)
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
@@ -152,11 +146,11 @@ class RegimesTerm(Term):
         """Regimes are found in the innovations; what they do to the movement itself may be more."""
         on = self.fit.on[:, None]
         # the fit holds the regimes' scale already; squares of its innovations say what is left of them
-        fine = float(log_sizes(fine_squares(fitted), on)[0][0])
-        moved = float(log_sizes(slow_squares(fitted), on)[0][0])
+        fine = float(spread.log_sizes(spread.fine_squares(fitted), on)[0][0])
+        moved = float(spread.log_sizes(spread.slow_squares(fitted), on)[0][0])
         factor = self.fit.factor * max(1.0, float(np.exp(moved)))
         loud = float(np.sum(self.fit.on[fitted.coarse.valid]))
-        error = factor / np.sqrt(2.0 * max(loud / SLOW_S, 1.0))
+        error = factor / np.sqrt(2.0 * max(loud / spread.SLOW_S, 1.0))
         lengths = {"on_s": self.fit.on_s, "off_s": self.fit.off_s}
         return (Regimes(factor=factor, factor_error=error, fine_factor=float(np.exp(fine)), **lengths),)
 
@@ -191,8 +185,90 @@ def probability_of_persistence(
         products = np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags]
         return float((weights @ products / scales).max())
 
-    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
-    for draw in range(DRAWS):
+    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(BLOCK_ORDERS)
+    for draw in range(BLOCK_ORDERS):
         drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
         null[draw] = score(drawn)
     return upper_tail(score(squares), null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
+
+
+# ---- cycles ----
+PERIODS_S = (4.0, 60.0)  # Periods that are tested. [s]
+# Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]
+WIDTHS = (1, 3, 7)
+SURROUNDINGS = 60  # Frequencies to each side that say how high the spectrum is without a cycle. [-]
+
+
+@dataclass(frozen=True, eq=False)
+class CycleTerm(Term):
+    """Sines and cosines of neighbouring frequencies."""
+
+    component: ClassVar[str] = "cycle"
+    kind: ClassVar[str] = "periodic"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    weight: ClassVar[float] = 1.0
+    seen_held_out: ClassVar[bool] = False
+    frequency: float  # [1/s]
+    width: int = 1  # Number of neighbouring frequencies: its phase drifts.
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Cosines and sines for each drive, shape (n, 2 * width * drives)."""
+        columns = np.zeros((len(coarse), coarse.drives, self.width, 2))
+        for index in range(coarse.drives):
+            rows = np.flatnonzero(coarse.drive == index)
+            near = self.frequency + (np.arange(self.width) - self.width // 2) / len(rows)
+            angle = 2.0 * np.pi * np.arange(len(rows))[:, None] * near
+            columns[rows, index] = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return columns.reshape(len(coarse), -1)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Highest spectral line of the whitened residual over its surroundings (F test), per long enough drive."""
+        coarse = fitted.coarse
+        if any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        drives = [coarse.drive == index for index in range(coarse.drives)]
+        lasting = [rows for rows in drives if coarse.valid[rows].sum() >= MIN_DRIFT_S]
+        outcomes = [_line(fitted.innovations[rows], width) for rows in lasting for width in WIDTHS]
+        if not outcomes:
+            return None
+        p_value, frequency, width = min(outcomes)
+        return Outcome(cls(frequency, width), (), min(1.0, p_value * len(outcomes)))
+
+    def matches(self, other: Self) -> bool:
+        """About the same period."""
+        return isinstance(other, CycleTerm) and bool(abs(np.log(self.frequency / other.frequency)) < 0.1)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Amplitude from the power of all its sines, noise taken out."""
+        coarse, part = fitted.coarse, fitted.mean_part(self)
+        sizes, errors = fitted.sizes[part], np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
+        power = max(float(np.sum(sizes**2) - np.sum(errors**2)) / coarse.drives, 1e-8)
+        seconds = float(coarse.valid.sum()) / coarse.drives
+        coherence = 1e6 if self.width == 1 else seconds / (np.pi * self.width)
+        amplitude, error = float(np.sqrt(power)), float(np.sqrt(np.mean(errors**2)))
+        period = 1.0 / self.frequency
+        return (Cycle(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Amplitude and period."""
+        effect = effects[0]
+        assert isinstance(effect, Cycle)
+        shape = f"period {effect.period_s:.1f} s"
+        return Description("weave", shape, effect.amplitude, effect.amplitude_error, OSCILLATION)
+
+
+def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:
+    """p-value over all frequencies, the best frequency, the width."""
+    from scipy.stats import f
+
+    power = np.abs(np.fft.rfft(rows)) ** 2 / max(float(rows @ rows), 1e-12)
+    frequency = np.fft.rfftfreq(len(rows))
+    band = (frequency >= 1.0 / PERIODS_S[1]) & (frequency <= 1.0 / PERIODS_S[0])
+    window, gap = np.ones(width), 2 * width + 11
+    around = np.convolve(power, np.ones(2 * SURROUNDINGS + 1), "same") - np.convolve(power, np.ones(gap), "same")
+    others = 2 * SURROUNDINGS + 1 - gap
+    ratio = np.where(band, np.convolve(power, window, "same") / np.maximum(around / others, 1e-12), 0.0)
+    at = int(np.argmax(ratio))
+    single = float(f.sf(ratio[at] / width, 2 * width, 2 * others))
+    return max(single * int(band.sum()), MINIMUM_P), float(frequency[at]), width

@@ -1,47 +1,28 @@
-"""The storyboard: init, stories, events, and their actions: global, user-defined, private."""
+"""The storyboard: init, stories, events; their actions, global, user-defined and private; triggers and conditions."""
 
 from __future__ import annotations
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.files.openscenario.conditions import read_trigger
 from xosc_lateral.files.openscenario.context import Context, Reader, declared, read_struct
-from xosc_lateral.files.openscenario.declarations import local_scope
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.files.openscenario.entities import (
-    read_bounding_box,
-    read_controller,
-    read_environment,
-    read_performance,
-)
+from xosc_lateral.files.openscenario.entities import READERS as ENTITY_READERS
+from xosc_lateral.files.openscenario.entities import read_date_time
 from xosc_lateral.files.openscenario.positions import READERS as POSITION_READERS
 from xosc_lateral.files.openscenario.positions import read_position
+from xosc_lateral.files.openscenario.references import local_scope
+from xosc_lateral.world.scenario import conditions, global_actions
 from xosc_lateral.world.scenario import private_actions as private
-from xosc_lateral.world.scenario.entity import BoundingBox, Controller, Performance
-from xosc_lateral.world.scenario.enums import DynamicsShape
-from xosc_lateral.world.scenario.global_actions import (
-    AddEntityAction,
-    DeleteEntityAction,
-    Environment,
-    EnvironmentAction,
-    ModifyOperation,
-    ParameterModifyAction,
-    ParameterSetAction,
-    SetMonitorAction,
-    TrafficAction,
-    TrafficSignalControllerAction,
-    TrafficSignalStateAction,
-    UserDefinedAction,
-    VariableModifyAction,
-    VariableSetAction,
-)
+from xosc_lateral.world.scenario.enums import DynamicsShape, EntityCategory
 from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import TransitionDynamics
 from xosc_lateral.world.scenario.scenario import (
     Action,
     Actors,
+    Condition,
+    ConditionGroup,
     Event,
     Init,
     Maneuver,
@@ -49,6 +30,7 @@ from xosc_lateral.world.scenario.scenario import (
     Private,
     Story,
     Trigger,
+    TriggeringEntities,
 )
 
 # Elements that only group others; what they hold is the action.
@@ -65,10 +47,7 @@ GROUPING = {
 
 
 def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]:
-    """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files.
-
-    In version 1.0 a ControllerAction holds both an assignment and an override; the assignment comes first.
-    """
+    """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files."""
     private = owner.tag == "PrivateAction"
     readers = PRIVATE_ACTIONS if private else GLOBAL_ACTIONS
     try:
@@ -93,11 +72,12 @@ def _contents(owner: XmlElement) -> list[XmlElement]:
     return elements
 
 
-def _entity(e: XmlElement, context: Context) -> AddEntityAction | DeleteEntityAction:
+def _entity(e: XmlElement, context: Context) -> Struct:
     if (add := e.child("AddEntityAction")) is not None:
-        return AddEntityAction(context.entity(e), read_position(add.required("Position"), context), place=e.place())
+        position = read_position(add.required("Position"), context)
+        return global_actions.AddEntityAction(context.entity(e), position, place=e.place())
     e.required("DeleteEntityAction")
-    return DeleteEntityAction(context.entity(e), place=e.place())
+    return global_actions.DeleteEntityAction(context.entity(e), place=e.place())
 
 
 def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
@@ -107,28 +87,30 @@ def _setting(sets: type[Struct], modifies: type[Struct]) -> Reader:
         if (change := e.child("SetAction")) is not None:
             return read_struct(sets, e, context, value=change.text("value"))
         rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
-        return read_struct(modifies, e, context, operation=ModifyOperation(rule.tag), value=rule.number("value"))
+        operation = global_actions.ModifyOperation(rule.tag)
+        return read_struct(modifies, e, context, operation=operation, value=rule.number("value"))
 
     return read
 
 
-def _traffic(e: XmlElement, _: Context) -> TrafficAction:
+def _traffic(e: XmlElement, _: Context) -> global_actions.TrafficAction:
     content = e.child()
-    return TrafficAction(content.tag if content else e.tag, place=e.place())
+    return global_actions.TrafficAction(content.tag if content else e.tag, place=e.place())
 
 
-def _user_defined(e: XmlElement, _: Context) -> UserDefinedAction:
+def _user_defined(e: XmlElement, _: Context) -> global_actions.UserDefinedAction:
     command = e.child("CustomCommandAction")
     if command is None:
-        return UserDefinedAction("", "", place=e.place())
-    return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
+        return global_actions.UserDefinedAction("", "", place=e.place())
+    return global_actions.UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), place=e.place())
 
 
 GLOBAL_ACTIONS: dict[str, Reader] = {
-    **declared(EnvironmentAction, SetMonitorAction, TrafficSignalStateAction, TrafficSignalControllerAction),
+    **declared(global_actions.EnvironmentAction, global_actions.SetMonitorAction),
+    **declared(global_actions.TrafficSignalStateAction, global_actions.TrafficSignalControllerAction),
     "EntityAction": _entity,
-    "ParameterAction": _setting(ParameterSetAction, ParameterModifyAction),
-    "VariableAction": _setting(VariableSetAction, VariableModifyAction),
+    "ParameterAction": _setting(global_actions.ParameterSetAction, global_actions.ParameterModifyAction),
+    "VariableAction": _setting(global_actions.VariableSetAction, global_actions.VariableModifyAction),
     "TrafficAction": _traffic,
     "UserDefinedAction": _user_defined,
 }
@@ -149,14 +131,16 @@ def _speed_profile(e: XmlElement, context: Context) -> private.SpeedProfileActio
 
 def _lane_offset(e: XmlElement, context: Context) -> private.LaneOffsetAction:
     dynamics = e.required("LaneOffsetActionDynamics")
-    shape = dynamics.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
+    shape = dynamics.value("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
     most = dynamics.optional_number("maxLateralAcc", finite=False)
     action = read_struct(private.LaneOffsetAction, e, context, shape=shape, max_lateral_acc=most)
     return replace(action, target=replace(action.target, value=-action.target.value)) if context.left_handed else action
 
 
 def _override(e: XmlElement, _: Context) -> private.OverrideControllerValueAction:
-    overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
+    overrides = tuple(
+        (item.tag, item.value("active", bool, False), item.optional_number("value")) for item in e.children()
+    )
     return private.OverrideControllerValueAction(overrides, place=e.place())
 
 
@@ -168,7 +152,7 @@ def _animation(e: XmlElement, context: Context) -> private.AnimationAction:
 
 def read_transition(e: XmlElement, context: Context) -> TransitionDynamics:
     """How a value goes to its target; a step needs no value."""
-    is_step = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
+    is_step = e.value("dynamicsShape", DynamicsShape, DynamicsShape.STEP) is DynamicsShape.STEP
     preset = {"value": 0.0} if is_step and e.optional_number("value", finite=False) is None else {}
     return read_struct(TransitionDynamics, e, context, **preset)
 
@@ -205,10 +189,6 @@ def _read_init(element: XmlElement, context: Context) -> Init:
     return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
 
 
-def _read_story(element: XmlElement, context: Context) -> Story:
-    return read_struct(Story, element.within(local_scope(element)), context)
-
-
 def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
     maneuvers = []
     for child in element.children("Maneuver", "CatalogReference"):
@@ -235,16 +215,81 @@ def _read_event(element: XmlElement, context: Context) -> Event:
     return read_struct(Event, element, context, actions=tuple(actions))
 
 
+# ---- triggers and conditions ----
+def _read_trigger(element: XmlElement, context: Context) -> Trigger:
+    """A start or stop trigger."""
+    groups = tuple(
+        ConditionGroup(tuple(_read_condition(condition, context) for condition in group.children("Condition")))
+        for group in element.children("ConditionGroup")
+    )
+    return Trigger(groups, element.place())
+
+
+def _read_condition(element: XmlElement, context: Context) -> Condition:
+    """A condition; one that nobody reads is unsupported."""
+    owner = element.required("ByEntityCondition", "ByValueCondition")
+    triggering, holder, readers = None, owner, VALUE_CONDITIONS
+    if owner.tag == "ByEntityCondition":
+        holder, readers = owner.required("EntityCondition"), ENTITY_CONDITIONS
+    kind = holder.child()
+    if kind is None:
+        owner.fail("contains no condition")
+    reader = readers.get(kind.tag)
+    content = reader(kind, context) if reader else Unsupported(kind.tag, kind.place())
+    if owner.tag == "ByEntityCondition":
+        triggering = read_struct(TriggeringEntities, owner.required("TriggeringEntities"), context)
+    return read_struct(Condition, element, context, content=content, triggering_entities=triggering)
+
+
+def _collision(e: XmlElement, context: Context) -> conditions.CollisionCondition:
+    reference, by_type = e.child("EntityRef"), e.child("ByType")
+    if reference is None and by_type is None:
+        e.fail("contains neither EntityRef nor ByType")
+    return conditions.CollisionCondition(
+        None if reference is None else context.entity(reference),
+        None if by_type is None else by_type.value("type", EntityCategory),
+        place=e.place(),
+    )
+
+
+def _time_to_collision(e: XmlElement, context: Context) -> conditions.TimeToCollisionCondition:
+    owner = e.required("TimeToCollisionConditionTarget")
+    reference = owner.child("EntityRef")
+    target = read_position(owner.required("Position"), context) if reference is None else context.entity(reference)
+    return read_struct(conditions.TimeToCollisionCondition, e, context, target=target)
+
+
+def _time_of_day(e: XmlElement, context: Context) -> conditions.TimeOfDayCondition:
+    moment = read_date_time(e)
+    if moment is None:
+        e.fail(f"dateTime='{e.text('dateTime')}' is not a date and time")
+    return read_struct(conditions.TimeOfDayCondition, e, context, date_time=moment)
+
+
+ENTITY_CONDITIONS: dict[str, Reader] = {
+    **declared(conditions.EndOfRoadCondition, conditions.OffroadCondition, conditions.StandStillCondition),
+    **declared(conditions.SpeedCondition, conditions.RelativeSpeedCondition, conditions.AccelerationCondition),
+    **declared(conditions.TraveledDistanceCondition, conditions.ReachPositionCondition, conditions.DistanceCondition),
+    **declared(conditions.RelativeDistanceCondition, conditions.RelativeClearanceCondition),
+    **declared(conditions.TimeHeadwayCondition, conditions.AngleCondition, conditions.RelativeAngleCondition),
+    "CollisionCondition": _collision,
+    "TimeToCollisionCondition": _time_to_collision,
+}
+VALUE_CONDITIONS: dict[str, Reader] = {
+    **declared(conditions.ParameterCondition, conditions.VariableCondition, conditions.UserDefinedValueCondition),
+    **declared(conditions.SimulationTimeCondition, conditions.StoryboardElementStateCondition),
+    **declared(conditions.TrafficSignalCondition, conditions.TrafficSignalControllerCondition),
+    "TimeOfDayCondition": _time_of_day,
+}
+
+
 READERS: dict[object, Reader] = {
     **POSITION_READERS,
-    BoundingBox: read_bounding_box,
-    Controller: read_controller,
-    Environment: read_environment,
+    **ENTITY_READERS,
     Event: _read_event,
     Init: _read_init,
     ManeuverGroup: _read_group,
-    Performance: read_performance,
-    Story: _read_story,
+    Story: lambda e, context: read_struct(Story, e.within(local_scope(e)), context),
     TransitionDynamics: read_transition,
-    Trigger: read_trigger,
+    Trigger: _read_trigger,
 }
