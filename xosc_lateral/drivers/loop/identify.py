@@ -105,20 +105,19 @@ def identify(
 
 def name_time_beside(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
-    for accepted_term in selection.accepted:
-        if not isinstance(accepted_term.term, MeanTerm | SpreadTerm) or not search.coarse.lasts:
+    for finding in selection.accepted:
+        before = finding.term
+        if not isinstance(before, MeanTerm | SpreadTerm) or not search.coarse.lasts:
             continue
-        without = selection.without([accepted_term.term], "").final
-        test = (StepTerm if isinstance(accepted_term.term, MeanTerm) else TimeSpreadTerm).test(search, without)
+        without = selection.without([before], "").final
+        test = (StepTerm if isinstance(before, MeanTerm) else TimeSpreadTerm).test(search, without)
         if test is None or test.term is None or not test.term.passes(search, test.p_value, without):
             continue
         by_time = fit_model(search.coarse, (*without.terms, test.term))
         if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
-            term = replace(accepted_term.term, alike=(*accepted_term.term.alike, ("time",)))
-            accepted = tuple(
-                replace(other, term=term) if other is accepted_term else other for other in selection.accepted
-            )
-            terms = [term if other is accepted_term.term else other for other in selection.final.terms]
+            term = replace(before, alike=(*before.alike, ("time",)))
+            accepted = tuple(replace(other, term=term) if other is finding else other for other in selection.accepted)
+            terms = [term if other is before else other for other in selection.final.terms]
             selection = replace(selection, accepted=accepted, final=fit_model(search.coarse, terms))
     return selection
 
@@ -141,14 +140,17 @@ def usable_columns(
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     """The base's own effects as far as the table has their columns, refitted, several lags in a row as one as late."""
-    there = {"lane_width", *timeline.context}
+    context = {"lane_width": timeline.lane_width, **timeline.context}
     terms: list[Term] = []
     for effect in base.effects:
-        if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
+        if isinstance(effect, ColumnEffect) and context.keys() >= set(effect.columns):
             known = structs.replace(unsized(effect), response_s=effect.response_time, response_order=1)
             if effect.acts is Acts.LOCATION:
-                between = is_between(effect) or _same_throughout(effect, timeline)
-                terms.append(BetweenTerm.of(known) if between else MeanTerm.of(known))
+                values = effect.known({name: context[name] for name in effect.columns})
+                inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
+                # the same all through every drive, as a vehicle's class is
+                steady = all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
+                terms.append((BetweenTerm if is_between(effect) or steady else MeanTerm).of(known))
             elif effect.acts is Acts.SPREAD:
                 terms.append(SpreadTerm.of(known))
         elif isinstance(effect, VarianceTrend):
@@ -159,14 +161,6 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
             terms += [TimeMeanTerm(len(effect.location))] if effect.location else []
             terms += [TimeSpreadTerm(len(effect.spread))] if effect.spread else []
     return tuple(terms)
-
-
-def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
-    """Whether an effect's quantity is the same all through every drive, as a vehicle's class is."""
-    context = {"lane_width": timeline.lane_width, **timeline.context}
-    values = effect.known({name: context[name] for name in effect.columns})
-    inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
-    return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
 
 
 def _worst_first(identified: Identified) -> Identified:
@@ -181,9 +175,8 @@ def _worst_first(identified: Identified) -> Identified:
         if fallen:
             identified = identified.without([min(fallen, key=lambda pair: pair[0])[1]], VETOED)
             continue
-        accepted = tuple(
-            replace(one, gain=gain) for one, gain in zip(identified.selection.accepted, gains, strict=True)
-        )
+        judged = zip(identified.selection.accepted, gains, strict=True)
+        accepted = tuple(replace(one, gain=gain) for one, gain in judged)
         identified = replace(identified, selection=replace(identified.selection, accepted=accepted))
         if any(gains):
             total = nested.together([term for term, gain in zip(terms, gains, strict=True) if gain])

@@ -132,15 +132,6 @@ def half_cosines_of(coarse: Coarse, number: int) -> FloatArray:
     return half_cosines(coarse.time, *clock_range(coarse), number)
 
 
-def without_known(
-    known: FloatArray, squares: FloatArray, columns: FloatArray, valid: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Squares, shape (n, 1), and columns, shape (n, k), without what is known to go with the size."""
-    both = np.column_stack([squares, columns])
-    both[valid] = beside(orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]])), both[valid])
-    return both[:, :1], both[:, 1:]
-
-
 def penalised(sizes: FloatArray, covariance: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sizes, shape (k,), and covariance, given a prior covariance but for its scale, which is likeliest (REML)."""
     largest = float(np.max(np.square(sizes) / np.diag(prior), initial=1e-300))

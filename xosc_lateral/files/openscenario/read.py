@@ -19,13 +19,7 @@ from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
 from xosc_lateral.world.scenario.place import Place, Unsupported
-from xosc_lateral.world.scenario.scenario import (
-    FileHeader,
-    Scenario,
-    Storyboard,
-    TrafficSignalController,
-    TrafficSignalPhase,
-)
+from xosc_lateral.world.scenario.scenario import FileHeader, Scenario, Storyboard, TrafficSignalController
 
 BOOLEANS = frozenset(
     {
@@ -116,14 +110,7 @@ def read_scenario(
     boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
     locations = _catalog_locations(root)
     catalogs = references.Catalogs(locations, boundary, remarks)
-    context = Context(
-        header.version,
-        catalogs,
-        remarks,
-        {**READERS, TrafficSignalPhase: _phase},
-        strict=strict,
-        left_handed=header.is_left_handed,
-    )
+    context = Context(header.version, catalogs, remarks, READERS, strict=strict, left_handed=header.is_left_handed)
     if header.is_left_handed:
         remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
     network = root.child("RoadNetwork")
@@ -213,9 +200,3 @@ def _road_file(
 def is_town(reference: str) -> bool:
     """A road by its name in CARLA ("Town04"), not by its file."""
     return bool(reference.strip()) and not any(sign in reference for sign in "./\\")
-
-
-def _phase(element: XmlElement, context: Context) -> TrafficSignalPhase:
-    shown = element.children("TrafficSignalState")
-    states = tuple((state.text("trafficSignalId"), state.text("state")) for state in shown)
-    return read_struct(TrafficSignalPhase, element, context, states=states)

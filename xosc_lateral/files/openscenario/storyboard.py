@@ -29,6 +29,7 @@ from xosc_lateral.world.scenario.scenario import (
     ManeuverGroup,
     Private,
     Story,
+    TrafficSignalPhase,
     Trigger,
     TriggeringEntities,
 )
@@ -215,6 +216,12 @@ def _read_event(element: XmlElement, context: Context) -> Event:
     return read_struct(Event, element, context, actions=tuple(actions))
 
 
+def _read_phase(element: XmlElement, context: Context) -> TrafficSignalPhase:
+    shown = element.children("TrafficSignalState")
+    states = tuple((state.text("trafficSignalId"), state.text("state")) for state in shown)
+    return read_struct(TrafficSignalPhase, element, context, states=states)
+
+
 # ---- triggers and conditions ----
 def _read_trigger(element: XmlElement, context: Context) -> Trigger:
     """A start or stop trigger."""
@@ -291,5 +298,6 @@ READERS: dict[object, Reader] = {
     ManeuverGroup: _read_group,
     Story: lambda e, context: read_struct(Story, e.within(local_scope(e)), context),
     TransitionDynamics: read_transition,
+    TrafficSignalPhase: _read_phase,
     Trigger: _read_trigger,
 }

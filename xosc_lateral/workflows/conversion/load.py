@@ -74,24 +74,19 @@ def load_scenario(
     values = tuple(sorted((parameters or {}).items()))
     state = check_regular(path)
     guard_input(path)
-    asked = (path, values, tuple(allowed), roads, strict)
+    folders = tuple(allowed)
     reads = _read_once.cache_info().misses
-    scenario = _read_once(*asked, state_key(state))
+    scenario = _read_once(path, values, folders, roads, strict, state_key(state))
     is_fresh = _read_once.cache_info().misses > reads
     stands_alone = not scenario.catalog_locations and not scenario.remarks
     if not is_fresh and not (stands_alone and (scenario.road_file is None or scenario.road_file.is_file())):
-        scenario = _read(*asked)  # a result that was kept holds only where nothing else was read, or missed
+        # A result that was kept holds only where nothing else was read, or missed.
+        scenario = read_scenario(path, dict(values), allowed=folders, roads=roads, strict=strict)
     network, road = RoadNetwork(()), tuple[tuple[Path, str], ...]()
     if scenario.road_file is not None:
         network = road_network(scenario.road_file)
         road = ((scenario.road_file, network.sha256),)
     return Loaded((*scenario.input_hashes.items(), *road), values, scenario, network)
-
-
-def _read(
-    path: Path, parameters: tuple[tuple[str, str], ...], allowed: tuple[Path, ...], roads: RoadSearch, strict: bool
-) -> Scenario:
-    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
 
 
 @lru_cache(maxsize=2)
@@ -103,7 +98,7 @@ def _read_once(
     strict: bool,
     _state: tuple[int, ...],
 ) -> Scenario:
-    return _read(path, parameters, allowed, roads, strict)
+    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
 
 
 @lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work

@@ -49,18 +49,18 @@ from xosc_lateral.world.scenario.scenario import (
     Story,
 )
 
-CHANGE_AT = 1.0
+CHANGE_START = 1.0
 """When an ego begins to drive faster or slower than in the nominal run. [s]"""
-BRAKE_AT = 5.0
+BRAKING_START = 5.0
 """When one begins to brake to a stop. [s]"""
 STANDING_TIME = 2.0
 """For which it stands. [s]"""
-RATE, BRAKING_RATE = 3.0, 5.0
+CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 """How fast they do so. [m/s2]"""
 
 TRIAL_STEP = 0.05
 """Of runs under other egos: they are about what happens. [s]"""
-AFTER_ALL = 2.0
+AFTERMATH_TIME = 2.0
 """After the last event of all, such a run is over: the last lane is reached, contacts have come about. [s]"""
 
 STORY = "xosc-lateral ego"
@@ -91,11 +91,11 @@ Speeds = tuple[tuple[float, float, float], ...]
 
 def _drives(speed: float) -> tuple[Speeds, ...]:
     """Ways to drive, beside the nominal one: slower, faster, to a stop and on."""
-    stopped = BRAKE_AT + speed / BRAKING_RATE + STANDING_TIME
+    stopped = BRAKING_START + speed / BRAKING_RATE + STANDING_TIME
     return (
-        ((CHANGE_AT, 0.8, RATE),),
-        ((CHANGE_AT, 1.2, RATE),),
-        ((BRAKE_AT, 0.0, BRAKING_RATE), (stopped, 1.0, RATE)),
+        ((CHANGE_START, 0.8, CHANGE_RATE),),
+        ((CHANGE_START, 1.2, CHANGE_RATE),),
+        ((BRAKING_START, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE)),
     )
 
 
@@ -150,7 +150,7 @@ def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
         return scenario
     kind, state = StoryboardElementType.STORY, StoryboardElementState.COMPLETE
     contents = (StoryboardElementStateCondition(kind, story.name, state, place=place) for story in stories)
-    over = (Condition("over", AFTER_ALL, ConditionEdge.NONE, content, None, place) for content in contents)
+    over = (Condition("over", AFTERMATH_TIME, ConditionEdge.NONE, content, None, place) for content in contents)
     trigger = structs.replace(stop, groups=(*stop.groups, ConditionGroup(tuple(over))))
     return replace(scenario, storyboard=structs.replace(storyboard, stop_trigger=trigger))
 

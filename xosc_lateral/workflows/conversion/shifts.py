@@ -36,7 +36,7 @@ from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
-PASSED_ON = 3.0
+LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
 LEAST_WAY = 1e-3
@@ -207,7 +207,7 @@ class _Shifts:
             if condition.triggering_entities is not None:
                 looked_at |= set(condition.triggering_entities.entity_refs)
             moved = [abs(shift) for name in looked_at for shift in self._of_entity.get(name, ())]
-            far = PASSED_ON * max(moved, default=0.0)
+            far = LARGEST_DELAY_RATIO * max(moved, default=0.0)
             causes += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
         return causes if causes and not others else [*causes, 0.0]
 

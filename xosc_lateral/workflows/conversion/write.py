@@ -13,7 +13,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
-from xosc_lateral.files.openscenario.write.build import named
+from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralAction
@@ -28,7 +28,7 @@ from xosc_lateral.workflows.conversion.result import (
 )
 from xosc_lateral.workflows.conversion.settings import OutputMode, relative
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.offset_chain import GRID, RESOLUTION, OffsetChain, OffsetPath, Ring, ring_along
+from xosc_lateral.world.motion.offset_chain import GRID, OFFSET_DECIMALS, OffsetChain, OffsetPath, Ring, ring_along
 from xosc_lateral.world.motion.trajectory import (
     SETTLING_TIME,
     NaturalSpline,
@@ -42,15 +42,15 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 LONGEST_TURN = 300.0
 """Of a ring: a run that is stopped by something that never happens lasts an hour. [s]"""
-ROAD_END = 20.0
+ROAD_END_MARGIN = 20.0
 """A path ends so far before its road: what lies beyond has no place. [m]"""
-LEAST_PATH = 60.0
+LEAST_PATH_LENGTH = 60.0
 """A shorter path is none; in its last so many metres it is led to where a ring begins. [m]"""
-CUT = 0.002
+CHORD_ERROR = 0.002
 """By which straight pieces may cut a bend. [m]"""
 LEAST_GAP = 1.0
 """Between vertices. [m]"""
-AT_ONCE = 0.1
+FOLLOW_ON_TIME = 0.1
 """A segment that begins within this after an action ends begins because of it. [s]"""
 
 
@@ -84,7 +84,7 @@ def write(plan: Plan, sampled: Enriched) -> Written:
         profiles={name: (profile.name, profile_hash(profile)) for name, profile in profiles.items()},
         options=plan.settings.record(folder),
         variant=plan.variant_index + 1,
-        version=named(plan.version),
+        version=version_text(plan.version),
         ego=tuple(plan.egos),
         modes={},
         content_sha256=PENDING_HASH,
@@ -164,8 +164,8 @@ def _in_phase(
     starts = [one.start for one in motion.actions if one.actor == entity.name and one.path in paths]
     ends = [one.end for one in motion.actions if one.path == after and one.end is not None]
     begin = 0.0 if after is None else min(ends, default=np.inf)
-    until = min((start for start in starts if start > begin + AT_ONCE), default=np.inf)
-    return (segment for segment in entity.segments if begin - AT_ONCE <= segment.span.start < until)
+    until = min((start for start in starts if start > begin + FOLLOW_ON_TIME), default=np.inf)
+    return (segment for segment in entity.segments if begin - FOLLOW_ON_TIME <= segment.span.start < until)
 
 
 def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
@@ -194,17 +194,17 @@ def _path(
     parts = [_sampled(segment, vehicle, driven, is_last=segment is segments[-1]) for segment in segments]
     side, _ = _middle(entity, network)
     length = network.roads[int(vehicle.road[0])].length
-    room = (length - float(vehicle.s[0]) if side > 0.0 else float(vehicle.s[0])) - ROAD_END
+    room = (length - float(vehicle.s[0]) if side > 0.0 else float(vehicle.s[0])) - ROAD_END_MARGIN
     reach = min(room, float(parts[-1].distance[-1]))
-    if reach < LEAST_PATH:
+    if reach < LEAST_PATH_LENGTH:
         return None
     at = _vertices(vehicle, network, driven, last, reach)
     through = deviation_through(parts)
     begin = through(np.array([0.0, LEAST_GAP]))
-    offset = through(at) - settle(at, LEAST_PATH, float(np.diff(begin)[0]) / LEAST_GAP, 0.0)
-    share = smoother_step((at - reach + LEAST_PATH) / LEAST_PATH)
+    offset = through(at) - settle(at, LEAST_PATH_LENGTH, float(np.diff(begin)[0]) / LEAST_GAP, 0.0)
+    share = smoother_step((at - reach + LEAST_PATH_LENGTH) / LEAST_PATH_LENGTH)
     offset += share * (end - offset)
-    return OffsetPath(tuple(np.round(at, 3).tolist()), tuple(np.round(offset, RESOLUTION).tolist()))
+    return OffsetPath(tuple(np.round(at, 3).tolist()), tuple(np.round(offset, OFFSET_DECIMALS).tolist()))
 
 
 def _sampled(segment: SampledSegment, vehicle: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
@@ -223,7 +223,7 @@ def _vertices(vehicle: EntityMotion, network: RoadNetwork, driven: FloatArray, l
     """Distances of vertices: every 0.1 s as it is driven nominally, closer in bends, never below 1 m. [m]"""
     rows = np.arange(0, last, max(1, round(GRID / (vehicle.time[1] - vehicle.time[0]))))
     bend = np.abs(network.lane_curvature(vehicle.road[rows], vehicle.lane[rows], vehicle.s[rows]))
-    gap = np.minimum(GRID * np.abs(vehicle.speed[rows]), np.sqrt(8.0 * CUT / np.maximum(bend, 1e-6)))
+    gap = np.minimum(GRID * np.abs(vehicle.speed[rows]), np.sqrt(8.0 * CHORD_ERROR / np.maximum(bend, 1e-6)))
     gap, distances = np.clip(gap, LEAST_GAP, None), [0.0]
     while distances[-1] < reach:
         distances.append(distances[-1] + float(np.interp(distances[-1], driven[rows], gap)))

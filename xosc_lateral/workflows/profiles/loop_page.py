@@ -142,7 +142,18 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
     for finding in result.findings:
         page.heading(_capital(finding.effect))
         page.text(loop_words.meaning(finding, result))
-        _add_picture(page, result, finding)
+        effect = finding.effects[0] if finding.effects else None
+        if not isinstance(effect, ColumnEffect):
+            draw, caption = loop_figures.DRAWINGS[effect.kind if effect is not None else finding.kind]
+            page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
+        elif finding.statistic in result.scored.real:
+            page.figure(
+                loop_figures.effect_figure(result, finding),
+                "Path: where the effect puts the car while its column goes from its usual value to a high one and "
+                "back. Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and "
+                "bands: two standard errors. Held-out blocks: means by fifths of the effect.",
+                f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
+            )
     page.heading("All effects in numbers")
     timed = any(finding.lag_s is not None for finding in result.findings)
     page.table(
@@ -168,21 +179,6 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         else "Effects without a column are drawn anew for every simulated vehicle."
     )
     page.text(f"The refined profile `{result.refined.name}` contains what was found. {applied}")
-
-
-def _add_picture(page: Page, result: LoopResult, finding: Finding) -> None:
-    effect = finding.effects[0] if finding.effects else None
-    if not isinstance(effect, ColumnEffect):
-        draw, caption = loop_figures.DRAWINGS[effect.kind if effect is not None else finding.kind]
-        page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
-    elif finding.statistic in result.scored.real:
-        page.figure(
-            loop_figures.effect_figure(result, finding),
-            "Path: where the effect puts the car while its column goes from its usual value to a high one and back. "
-            "Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and bands: two "
-            "standard errors. Held-out blocks: means by fifths of the effect.",
-            f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
-        )
 
 
 def _add_residuals(page: Page, result: LoopResult) -> None:

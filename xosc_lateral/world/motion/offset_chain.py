@@ -29,7 +29,7 @@ GRID = 0.1
 """Between places where a move may begin or end: above 5 Hz nobody steers. [s]"""
 LONGEST_MOVE = 6.0
 """Longer ones are never the cheapest: drivers turn back every 2 to 4 s. [s]"""
-WEIGHTS = (1.0, 0.5, 0.2)
+ERROR_WEIGHTS = (1.0, 0.5, 0.2)
 """What errors of place, of lateral speed and of lateral acceleration count. [1/s], [-], [s]"""
 JOINT_PRICE = 0.25
 """Of a move, as much as errors as large as the path's own speed for so long. With it the autocorrelation of the lateral
@@ -48,7 +48,7 @@ STILL_TIME = 0.01
 """A lane offset action stands still in its first frame. [s]"""
 CLOSING_TIME = 12.0
 """In which a ring's end is led to where it began. [s]"""
-RESOLUTION = 4
+OFFSET_DECIMALS = 4
 """Decimals of an offset: the changes of a ring sum up to nothing, to the last of them. [-]"""
 
 
@@ -104,8 +104,8 @@ def resized(chain: OffsetChain, size: Size) -> OffsetChain:
     ring, placed, factor = chain.ring, chain.placed_t, size.factor
     places = np.cumsum([ring.origin, *(move.change for move in ring.moves[:-1])])
     farthest = size.limit * np.abs(places).max()
-    places = np.round(factor * np.clip(places, -farthest, farthest), RESOLUTION)
-    changes = np.round(np.diff(np.append(places, places[:1])), RESOLUTION).tolist() if factor else ()
+    places = np.round(factor * np.clip(places, -farthest, farthest), OFFSET_DECIMALS)
+    changes = np.round(np.diff(np.append(places, places[:1])), OFFSET_DECIMALS).tolist() if factor else ()
     moves = tuple(replace(move, change=change) for move, change in zip(ring.moves, changes, strict=False) if change)
     if placed is not None:
         begun = ring.origin if chain.path is None else chain.path.offset[0]
@@ -125,8 +125,8 @@ def ring_along(time: FloatArray, offset: FloatArray, *, from_middle: bool) -> Ri
     path = np.roll(path, -first)
     joints = joints_of(path)
     if len(joints) < 2:
-        return Ring(round(float(path[0]), RESOLUTION), ())
-    places = np.round(places_of(path, joints), RESOLUTION)
+        return Ring(round(float(path[0]), OFFSET_DECIMALS), ())
+    places = np.round(places_of(path, joints), OFFSET_DECIMALS)
     return Ring(float(places[0]), _moves(joints, len(path), places))
 
 
@@ -177,7 +177,7 @@ def _costs(path: FloatArray, reach: int) -> FloatArray:
     real = windows - windows[:, :1]
     change = real[:, 1:]
     cost, within = np.full((n, reach), JOINT_PRICE), np.tri(reach, reach + 1, 1)
-    for factor in WEIGHTS:
+    for factor in ERROR_WEIGHTS:
         seen = share * within
         squares, both = weight @ (seen**2).T, (weight * real) @ seen.T
         cost += factor**2 * GRID * (change**2 * squares - 2.0 * change * both + (weight * real**2) @ within.T)
@@ -221,7 +221,7 @@ def places_of(path: FloatArray, joints: IntArray) -> FloatArray:
     weight = np.append(1.0, np.sqrt(1.0 / _activity(path)))
     rows, wanted = list[FloatArray](), list[FloatArray]()
     speeds = np.diff(design, axis=0), np.diff(whole)
-    for factor in WEIGHTS:
+    for factor in ERROR_WEIGHTS:
         rows.append(factor * weight[: len(design), None] * design)
         wanted.append(factor * weight[: len(design)] * whole)
         design, whole = np.diff(design, axis=0) / GRID, np.diff(whole) / GRID
@@ -235,7 +235,7 @@ def _moves(joints: IntArray, rows: int, places: FloatArray) -> tuple[Move, ...]:
     """From place to place, without moves to where the car is already: those after them wait."""
     moves: list[Move] = []
     wait = 0.0
-    changes = np.round(np.diff(np.append(places, places[0])), RESOLUTION)
+    changes = np.round(np.diff(np.append(places, places[0])), OFFSET_DECIMALS)
     for steps, change in zip(np.diff(np.append(joints, rows)).tolist(), changes.tolist(), strict=True):
         if change == 0.0:
             wait += GRID * steps

@@ -22,7 +22,7 @@ from xosc_lateral.world.motion.nominal import Activity
 
 VERTEX_STEP = 0.1
 """Time between vertices where distance and bends allow it. [s]"""
-BEND = 3
+LEAST_BEND_GAPS = 3
 """Gaps in a row that a path is cut in by half the tolerance or more: a kink is in one gap, or in two. [-]"""
 VERTEX_SPACING = 0.105
 """Least distance between vertices: the player's 0.1 m and a margin for rounding. [m]"""
@@ -255,7 +255,7 @@ def _is_cut(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -
         aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
         return np.asarray(aside > TOLERANCE / 2.0)
 
-    return any(part.stop - part.start >= BEND for part in slices_where(len(times) - 1, is_far))
+    return any(part.stop - part.start >= LEAST_BEND_GAPS for part in slices_where(len(times) - 1, is_far))
 
 
 def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> FloatArray:

@@ -22,7 +22,7 @@ from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.positions import LaneCoordinates, LaneInfo, LaneState, Pose, RoadMark
 from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, project_at, surface_pose
 from xosc_lateral.world.road.routes import Routes
-from xosc_lateral.world.road.surface import NO_OFFSET, HeaderOffset
+from xosc_lateral.world.road.surface import HeaderOffset
 
 
 class RoadNetwork(SurfaceIndex, Routes):
@@ -37,7 +37,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         notes: tuple[str, ...] = (),
         geo_reference: str | None = None,
         sha256: str = "",
-        header_offset: HeaderOffset = NO_OFFSET,
+        header_offset: HeaderOffset | None = None,
     ) -> None:
         SurfaceIndex.__init__(self, roads, path)
         Routes.__init__(self, roads, junctions)
@@ -50,7 +50,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         """Projection of inertial x, y (PROJ string)."""
         self.sha256 = sha256
         """Of the bytes that were parsed; empty: not read from a file."""
-        self.header_offset = header_offset
+        self.header_offset = header_offset or HeaderOffset()
         """From the coordinates of the file, which all answers are in, to inertial ones."""
 
     # ---- names and signs ---------------------------------------------------------------------------------------------

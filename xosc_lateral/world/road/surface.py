@@ -150,6 +150,3 @@ class HeaderOffset(Struct, frozen=True):
         """An inertial direction along the axes of the file. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * dx + s * dy, c * dy - s * dx
-
-
-NO_OFFSET = HeaderOffset()

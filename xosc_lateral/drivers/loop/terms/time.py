@@ -20,7 +20,7 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop import low_frequencies as low
-from xosc_lateral.drivers.loop.dictionary import Search
+from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
@@ -216,10 +216,11 @@ class TimeSpreadTerm(Term):
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             tested = []
             for slow, squares in enumerate((spread.quick_squares(fitted), spread.slow_squares(fitted))):
-                rows, basis = low.without_known(known, squares.standardised, columns, squares.valid)
-                rows, basis = (
-                    low.low_frequencies(one, fitted.coarse, squares.valid, low.SHORTEST_S) for one in (rows, basis)
-                )
+                valid, both = squares.valid, np.column_stack([squares.standardised, columns])
+                constant = np.ones(valid.sum())
+                both[valid] = beside(orthonormal(np.column_stack([constant, known[valid]])), both[valid])
+                parts = (both[:, :1], both[:, 1:])
+                rows, basis = (low.low_frequencies(own, fitted.coarse, valid, low.SHORTEST_S) for own in parts)
                 tests = low.smooth_probabilities(rows[:, 0], basis, low.SPREAD_ORDERS)
                 tested += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None

@@ -25,7 +25,7 @@ Pose = tuple[float, float, float, float, float, float]
 """x, y, z [m], heading, pitch, roll [rad]."""
 
 
-def named(version: Version) -> str:
+def version_text(version: Version) -> str:
     """A version as people write it."""
     return f"{version[0]}.{version[1]}"
 

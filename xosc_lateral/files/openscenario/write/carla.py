@@ -5,9 +5,9 @@ From its published sources (0.9.16: `openscenario_configuration`, `openscenario_
 
 - Version 1.0 alone, and valid; no expressions, and parameters not everywhere: values are written.
 - Catalogs are looked for as ``FOLDER/VehicleCatalog.xosc``, of version 1.0: entries are written in place.
-- The default control moves waypoints to the middle of their lane. `CONTROL` goes to them as they are, at their times,
-  which count from when it got them: every drive begins at 0 s. Without a next waypoint it fails, so a last one lies
-  an hour ahead. It divides by the time left to the next one: vertices lie between its frames of `FRAME`, not on them.
+- The default control moves waypoints to the middle of their lane. `CONTROL_NAME` goes to them as they are, at their
+  times, which count from when it got them: every drive begins at 0 s. Without a next waypoint it fails, so a last one
+  lies an hour ahead. It divides by the time left to the next one: vertices lie between its frames, not on them.
 - One waypoint list per drive, stops included: a new one would begin up to a frame late.
 - A storyboard's stop trigger is only looked at for criteria; acts end by their own.
 - One vehicle is the ego, by a property; else nothing is watched.
@@ -42,9 +42,9 @@ from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, Priority
 from xosc_lateral.world.scenario.scenario import Scenario
 
-CONTROL = "vehicle_velocity_control"
+CONTROL_NAME = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""
-FRAME = 0.05
+FRAME_TIME = 0.05
 """Its default frame. [s]"""
 HOLD_DURATION = 3600.0
 """How long after a drive its last waypoint is due. [s]"""
@@ -123,9 +123,9 @@ def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatAr
     for piece in pieces:
         rows = slice(piece.first, piece.last + 1)
         times += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        times.append(float(path.time[piece.last]) + FRAME)
-    between = (np.floor((np.array(times[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
-    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME)))
+        times.append(float(path.time[piece.last]) + FRAME_TIME)
+    between = (np.floor((np.array(times[1:]) - begin) / FRAME_TIME - 0.5) + 0.5) * FRAME_TIME
+    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME_TIME)))
     return np.asarray(moments)
 
 
@@ -244,7 +244,7 @@ def _assign_controls(root: etree._Element, entities: Sequence[Entity]) -> None:
             names.remove(str(owner.get("entityRef")))
             action = etree.Element("PrivateAction")
             both = build.sub(action, "ControllerAction")
-            controller = build.sub(both, "AssignControllerAction/Controller", name=CONTROL)
-            build.sub(controller, "Properties/Property", name="module", value=CONTROL)
+            controller = build.sub(both, "AssignControllerAction/Controller", name=CONTROL_NAME)
+            build.sub(controller, "Properties/Property", name="module", value=CONTROL_NAME)
             add_missing_overrides(both)
             build.insert_indented(owner, len(owner), action)

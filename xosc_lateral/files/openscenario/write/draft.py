@@ -15,7 +15,7 @@ from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.provenance import refuse_converted
 from xosc_lateral.files.openscenario.references import final, parameter_name
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.build import Version, Vertices, named
+from xosc_lateral.files.openscenario.write.build import Version, Vertices, version_text
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario.parameters import Scope
@@ -58,7 +58,7 @@ STANDARD = TargetPlayer()
 
 def target(player: str = Player.STANDARD.value, version: str | None = None) -> TargetPlayer:
     """From a user's words: a player's name, and a version such as "1.2"; `ValueError` for words that are neither."""
-    known = {named(one): one for one in VERSIONS}
+    known = {version_text(one): one for one in VERSIONS}
     if version is not None and version not in known:
         raise ValueError(f"version {version!r} can't be written; {', '.join(known)} can")
     return TargetPlayer(Player(player), None if version is None else known[version])

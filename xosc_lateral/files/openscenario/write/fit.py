@@ -10,7 +10,7 @@ from typing import Any
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
-from xosc_lateral.files.openscenario.write.build import named
+from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.carla import fit_carla
 from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Player, TargetPlayer, WrittenScenario
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions, add_lane_offsets
@@ -66,7 +66,7 @@ def write_converted(
 def _fit(draft: Draft, converted: Sequence[str], *, is_reactive: bool) -> None:
     """Change what the target does not know, and note it; `FormatError` for what the scenario can't do without."""
     scenario = draft.scenario
-    losses = Losses(draft.root, scenario.path, f"version {named(draft.version)}", is_reactive, draft.notes)
+    losses = Losses(draft.root, scenario.path, f"version {version_text(draft.version)}", is_reactive, draft.notes)
     if draft.is_adapted:
         inline_catalogs(losses, draft)
         if draft.version == (1, 0):

@@ -32,10 +32,10 @@ from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.private_actions import LATERAL, LONGITUDINAL, TeleportAction
 from xosc_lateral.world.scenario.scenario import Scenario
 
-CHAIN = "xosc-lateral offsets"
-TURNS = 10000
+CHAIN_NAME = "xosc-lateral offsets"
+RING_TURNS = 10000
 """Turns of a ring: as good as for ever. [-]"""
-LOOKING = 0.06
+LOOK_DELAY = 0.06
 """So long after an act has begun its conditions look at what is, not at what has been: a frame of up to 0.05 s. [s]"""
 FIRST_WAIT = 0.12
 """The first move waits so long, two such frames: what is to stop it may begin with the act. [s]"""
@@ -45,7 +45,7 @@ SLOW_SHARE = 0.9
 """Of its least nominal speed, above which one begins that never is that fast, nor near to where moves end. [-]"""
 HALTING_SPEED = 8.0
 """Below it, a move under way ends: a car that brakes harder does not slide sideways when it stands. [m/s]"""
-REPEATED = 3
+SPARE_ACTS = 3
 """Acts more than runs in the nominal run, after an action that may run again. [-]"""
 
 
@@ -105,8 +105,8 @@ class _Acts:
         """Add them to the story."""
         item = next((one for one in self._items if one.path == self._chain.after), None)
         before: str | None = None
-        for _ in range(1 if item is None or not item.repeats else self._runs + REPEATED):
-            act = build.sub(self._story, "Act", name=f"{CHAIN} {len(self._story) + 1}")
+        for _ in range(1 if item is None or not item.repeats else self._runs + SPARE_ACTS):
+            act = build.sub(self._story, "Act", name=f"{CHAIN_NAME} {len(self._story) + 1}")
             name = str(act.get("name"))
             path = None if self._chain.path is None else self._add_path(act, name, self._chain.path)
             self._add_ring(act, name, path)
@@ -157,7 +157,7 @@ class _Acts:
             lead = self._event(build.sub(group, "Maneuver", name=f"{name} lead"), f"{name} lead event", leading(ring))
             self._begin(lead, "act", name, "runningState", FIRST_WAIT)
         group = build.maneuver_group(act, f"{name} ring", entity)
-        group.set("maximumExecutionCount", str(TURNS))
+        group.set("maximumExecutionCount", str(RING_TURNS))
         maneuver = build.sub(group, "Maneuver", name=f"{name} ring")
         before = lead
         for number, move in enumerate(ring.moves, start=1):
@@ -190,7 +190,7 @@ class _Acts:
         group = build.maneuver_group(act, f"{name} halt", self._chain.entity)
         maneuver = build.sub(group, "Maneuver", name=f"{name} halt")
         event = build.event(maneuver, f"{name} halt event", Priority.OVERRIDE, self._version)
-        event.set("maximumExecutionCount", str(TURNS))
+        event.set("maximumExecutionCount", str(RING_TURNS))
         self._add_offset(event, {"dynamicsShape": "step"}, 0.0)
         group = build.sub(event, "StartTrigger/ConditionGroup")
         if path is not None:
@@ -208,7 +208,7 @@ class _Acts:
             # A controller is given its domain at once, and some players' assignments run for ever.
             state = "runningState" if item.steers is None else "startTransition"
             build.state_condition(group, item.kind, item.reference, state, 0.0)
-            build.state_condition(group, "act", name, "runningState", LOOKING)
+            build.state_condition(group, "act", name, "runningState", LOOK_DELAY)
 
 
 def _moving_speed(motion: NominalMotion, chain: OffsetChain) -> float:

@@ -29,7 +29,7 @@ from xosc_lateral.world.scenario.enums import Priority
 MOTION_SINCE = (1, 4)
 """Version from which a vertex may say how fast the entity is there."""
 
-CATCH_UP = 20.0
+CATCH_UP_RATIO = 20.0
 """Over so many times as long as a heading is late it catches up before a path is over: 5 % faster than it turns. [-]"""
 
 
@@ -242,7 +242,7 @@ def _heading_times(times: FloatArray) -> FloatArray:
     around = (len(gaps) - 1) // 2, len(gaps) // 2
     usual = 0.5 * float(np.partition(gaps, around)[[*around]].mean())  # median; numpy's would load `numpy.ma`
     middle = times + np.minimum(0.5 * np.append(gaps, 0.0), usual)
-    late = usual * np.minimum((times[-1] - middle) / (CATCH_UP * usual), 1.0)
+    late = usual * np.minimum((times[-1] - middle) / (CATCH_UP_RATIO * usual), 1.0)
     return np.asarray(np.minimum(middle - late, times[-1]))
 
 

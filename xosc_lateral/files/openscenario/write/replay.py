@@ -249,8 +249,8 @@ def motion_unknown_to(
             continue
         what = newer_than(source_of(played.action, scenario, root), version)
         if what is not None:
-            reasons[actor] = f"version {build.named(version)} has no {what}"
+            reasons[actor] = f"version {build.version_text(version)} has no {what}"
     if version < TRAILERS_SINCE:
         trailers = sorted(pulled_entities(scenario, motion) & set(entities))
-        reasons |= dict.fromkeys(trailers, f"version {build.named(version)} has no Trailer")
+        reasons |= dict.fromkeys(trailers, f"version {build.version_text(version)} has no Trailer")
     return reasons

@@ -119,7 +119,7 @@ class RunningAction(StoryboardElement):
 class AtOnce(RunningAction):
     """All of it is done when it starts; its end is that of its first step, unless it ends itself."""
 
-    def __init__(self, do: Do, domains: Domain, *played: Any) -> None:
+    def __init__(self, do: Callable[[Any, AtOnce], None], domains: Domain, *played: Any) -> None:
         super().__init__(*played)
         self.domains = domains
         self._do = do
@@ -128,14 +128,11 @@ class AtOnce(RunningAction):
         self._do(self.content, self)
 
 
-Do: TypeAlias = Callable[[Any, AtOnce], None]
-"""What an action does at once, from its content."""
-
 Maker: TypeAlias = Callable[[Action, EntityState | None, Simulation], RunningAction]
 """Makes an action ready to run, of what a file says, who acts and where."""
 
 
-def at_once(do: Do, domains: Domain = Domain.NONE) -> Maker:
+def at_once(do: Callable[[Any, AtOnce], None], domains: Domain = Domain.NONE) -> Maker:
     """An action of which all is done when it starts."""
     return partial(AtOnce, do, domains)
 

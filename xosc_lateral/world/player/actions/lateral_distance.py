@@ -21,12 +21,11 @@ from xosc_lateral.world.scenario.private_actions import DynamicConstraints, Late
 
 
 class BesideOnRoad:
-    """Moves an entity sideways on the road: at once, at a limited speed, or by a critically damped spring.
+    """Moves an entity sideways on the road, to `wanted` on the left of the other [m].
 
-    The spring is for a limited acceleration. Nothing moves in the first frame. The way of a frame on the entity's own
-    track is `speed * step`: what goes sideways is missing ahead, but for an entity that moves at once.
-
-    `wanted`: to the left of the other entity. [m]
+    At once, at a limited speed, or, where its acceleration is limited, by a critically damped spring. Nothing moves in
+    the first frame. The way of a frame on the entity's own track is `speed * step`: what goes sideways is missing
+    ahead, but for an entity that moves at once.
     """
 
     def __init__(self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 from math import hypot, nan, pi
 
 import numpy as np
@@ -151,7 +150,7 @@ class ClothoidPath(Path):
     """Clothoid pieces one after another. `pieces`: at least one; `end_time`: [s]; NaN without times."""
 
     def __init__(self, pieces: Sequence[TimedClothoid], end_time: float = nan) -> None:
-        lengths = accumulate((piece.length for piece in pieces), initial=0.0)
+        lengths = itertools.accumulate((piece.length for piece in pieces), initial=0.0)
         super().__init__(tuple(lengths), (*(piece.start_time for piece in pieces), end_time))
         self.pieces = tuple(pieces)
         self.spans = tuple(piece.length for piece in pieces)
