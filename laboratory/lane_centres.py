@@ -62,7 +62,7 @@ def lanes_of(source: Path) -> tuple[list[Lane], list[FloatArray]]:
     height = tracks["dimension_height"].to_numpy()
     lanes = []
     for way in (True, False):
-        for index in range(dlr_ht.LANES):
+        for index in range(dlr_ht.LANE_COUNT):
             rows = np.flatnonzero(kept & (forward == way) & (lane == index))
             lanes.append(Lane(s[rows], d[rows], height[rows], vehicle[rows], rows))
     measured = np.flatnonzero(kept & ~tracks["interpolated"].to_numpy())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -74,7 +74,13 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
         columns |= {} if name in LABELS else _numeric_columns(name, table, path)
-    _require_columns(columns, path)
+    if "time" not in columns:
+        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+        raise FormatError(what, path=path, line=1)
+    if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
+        needed = "needs distance_left and distance_right, or offset and lane_width"
+        what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+        raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     drives = []
     for name, rows in _rows_of_drives(table, path):
@@ -172,17 +178,6 @@ def _holds_levels(name: str, values: FloatArray) -> bool:
         return False
     known = values[~np.isnan(values)]
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
-
-
-def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
-    what = ""
-    if "time" not in columns:
-        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
-    elif not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
-        needed = "needs distance_left and distance_right, or offset and lane_width"
-        what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
-    if what:
-        raise FormatError(what, path=path, line=1)
 
 
 def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:

@@ -57,7 +57,13 @@ def write_table(
     """As `write_frame`, for tables that have a CSV of their own; whole or not at all."""
     name = path.name.lower()
     if name.endswith(PARQUET):
-        write_atomically(path, _parquet(frame(), stamped(provenance)))
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table, buffer = pa.Table.from_pandas(frame(), preserve_index=False), io.BytesIO()
+        metadata = {**(table.schema.metadata or {}), METADATA_KEY: canonical_json(stamped(provenance)).encode()}
+        pq.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
+        write_atomically(path, buffer.getvalue())
         return
     data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)
     record = stamped(provenance) | {"sha256": hash_of(data)}
@@ -84,17 +90,6 @@ def harmless_frame(frame: pd.DataFrame) -> pd.DataFrame:
 def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Provenance with the package that wrote it."""
     return {"package": f"xosc-lateral {__version__}", **provenance}
-
-
-def _parquet(frame: pd.DataFrame, provenance: Mapping[str, Any]) -> bytes:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = pa.Table.from_pandas(frame, preserve_index=False)
-    metadata = {**(table.schema.metadata or {}), METADATA_KEY: canonical_json(provenance).encode()}
-    buffer = io.BytesIO()
-    pq.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
-    return buffer.getvalue()
 
 
 COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")

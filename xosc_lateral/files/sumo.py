@@ -17,7 +17,7 @@ from xosc_lateral.files.xml import root_tag
 if TYPE_CHECKING:
     from lxml import etree
 
-WIDTH = 3.2  # of SUMO's lanes [m]
+LANE_WIDTH = 3.2  # of SUMO's lanes [m]
 
 LENGTHS = {
     "trailer": 16.5, "truck": 7.1, "lkw": 7.1, "coach": 14.0, "bus": 12.0, "delivery": 6.5, "emergency": 6.5,
@@ -65,7 +65,7 @@ def read_sumo_net(path: Path) -> SumoNet:
             allowed, denied = (set(element.get(key, "").split()) for key in ("allow", "disallow"))
             is_driving = not (allowed and allowed <= ON_FOOT) and "all" not in denied
             shape = element.get("shape", "")
-            width = WIDTH if element.get("width") is None else number_of(element, "width", path)
+            width = LANE_WIDTH if element.get("width") is None else number_of(element, "width", path)
             net.lanes[name] = SumoLane(edge, int(index), width, number_of(element, "length", path), is_driving, shape)
         elif element.tag == "connection" and element.get("from") is not None:
             here, there = (f"{element.get(end)}_{element.get(f'{end}Lane')}" for end in ("from", "to"))

@@ -61,7 +61,14 @@ def _read(path: Path, encoding: str | None = None, separator: str | None = None,
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
     """The table with all cells as text, missing ones empty."""
-    return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
+
+    def text(value: object) -> str:
+        is_nan = isinstance(value, float) and value != value
+        if value is None or is_nan or type(value).__name__ in ("NAType", "NaTType"):
+            return ""
+        return json.dumps(value) if isinstance(value, dict | list) else str(value)
+
+    return pd.DataFrame({str(name): [text(value) for value in table[name]] for name in table.columns})
 
 
 @contextmanager
@@ -179,12 +186,6 @@ def _separator(text: IO[bytes], path: Path) -> str:
         advice = "if numbers have a decimal comma, separate them by semicolons or tabs"
         raise FormatError(f"{what}; {advice}", path=path, line=2)
     return separator
-
-
-def _as_text(value: object) -> str:
-    if value is None or type(value).__name__ in ("NAType", "NaTType") or (isinstance(value, float) and value != value):
-        return ""
-    return json.dumps(value) if isinstance(value, dict | list) else str(value)
 
 
 class ContextTable(dict[str, tuple[FloatArray, FloatArray]]):

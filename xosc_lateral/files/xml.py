@@ -43,7 +43,9 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
     """
     if not data.strip(b" \t\r\n\xef\xbb\xbf"):
         raise FormatError("the file is empty", path=path)
-    _check_size(data, path)
+    estimate = len(data) + _BYTES_PER_TAG * data.count(b"<") + _BYTES_PER_ATTRIBUTE * data.count(b"=")
+    if estimate > XML_TREE.bytes:
+        raise FormatError(XML_TREE.refusal(estimate / 1e6), path=path)
     if b"<!ENTITY" in data:
         line = data[: data.index(b"<!ENTITY")].count(b"\n") + 1
         raise FormatError("entity declarations are not allowed", path=path, line=line, element="DOCTYPE")
@@ -128,9 +130,3 @@ def _read_cached(path: str, _state: tuple[int, ...]) -> XmlDocument:
 def _read(path: Path) -> XmlDocument:
     content = read_source(path, XML_TREE)
     return XmlDocument(parse_xml(content.data, path), content.data, content.sha256)
-
-
-def _check_size(data: bytes, path: object) -> None:
-    estimate = len(data) + _BYTES_PER_TAG * data.count(b"<") + _BYTES_PER_ATTRIBUTE * data.count(b"=")
-    if estimate > XML_TREE.bytes:
-        raise FormatError(XML_TREE.refusal(estimate / 1e6), path=path)

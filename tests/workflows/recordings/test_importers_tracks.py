@@ -12,9 +12,8 @@ import pytest
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.recordings.importers.track_table import read_esmini_log
-from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
+from xosc_lateral.workflows.recordings.importers.tracks import Strip, graph_of_shapes, import_tracks
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph
 
 WIDTH = 3.5
 HEADING = 0.3
@@ -140,7 +139,7 @@ def test_what_lies_side_by_side_on_a_curve_has_one_station_in_whatever_order_lan
             left[where[0, part]] = where[1, part]
         for k in (0, 1):
             following[where[k, 0]] = [where[k, 1]]
-        graph = lane_graph(shapes, left, following)
+        graph = graph_of_shapes(shapes, left, following)
         middles = np.array([0.3, 1.2])  # of the angle, one in each part
         stations = {}
         for k in (0, 1):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from xosc_lateral.world.road.lanes import DRIVING, Lane, LaneSection, beside
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import RoadMark
 
-STEP = 1.0  # between two points of a line before it is simplified [m]
-TOLERANCE = 2.5e-4  # points that change a line by less are left out [m]
+POINT_SPACING = 1.0  # between two points of a line before it is simplified [m]
+LINE_TOLERANCE = 2.5e-4  # points that change a line by less are left out [m]
 BEFORE_END = 1e-6  # the last point of a section lies this much before its end, where the next one begins [m]
 Piece = tuple[int, int, int]  # road, lane section, lane
 
@@ -108,14 +109,9 @@ def write_lanes(message: Any, ids: RoadIds) -> None:
             about.left_lane_boundary_id.add().value = edge
         for edge in right_edges:
             about.right_lane_boundary_id.add().value = edge
-        _pair(about, ids, (road, k, name), lane)
-
-
-def _pair(about: Any, ids: RoadIds, piece: Piece, lane: Lane) -> None:
-    """One entry per way through: OSI pairs where a lane comes from with where it leads."""
-    before, after = ([*_next(ids, piece, lane, side)] for side in (-lane.direction, lane.direction))
-    for antecessor in before or [0]:  # 0 is nobody's
-        for successor in after or [0]:
+        # one entry per way through: OSI pairs where a lane comes from with where it leads; 0 is nobody's
+        before, after = ([*_next(ids, (road, k, name), lane, side)] for side in (-lane.direction, lane.direction))
+        for antecessor, successor in product(before or [0], after or [0]):
             if antecessor or successor:
                 pair = about.lane_pairing.add()
                 if antecessor:
@@ -141,7 +137,7 @@ def _next(ids: RoadIds, piece: Piece, lane: Lane, side: int) -> Iterator[int]:
 
 def _grid(section: LaneSection) -> FloatArray:
     end = section.end - BEFORE_END
-    return np.linspace(section.start, end, max(2, int(np.ceil((end - section.start) / STEP)) + 1))
+    return np.linspace(section.start, end, max(2, int(np.ceil((end - section.start) / POINT_SPACING)) + 1))
 
 
 def _line(network: RoadNetwork, road: int, lane: int, s: FloatArray, across: float) -> FloatArray:
@@ -151,7 +147,7 @@ def _line(network: RoadNetwork, road: int, lane: int, s: FloatArray, across: flo
     poses = network.lane_to_world(road, lane, s, offset)
     x, y, z, _ = network.header_offset.apply(poses.x, poses.y, poses.z, poses.heading)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    kept = np.union1d(simplify(x, y, TOLERANCE), simplify(way, z, TOLERANCE))
+    kept = np.union1d(simplify(x, y, LINE_TOLERANCE), simplify(way, z, LINE_TOLERANCE))
     return np.stack([x, y, z], axis=1)[kept]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
 from operator import itemgetter
@@ -213,19 +214,15 @@ def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, An
     """States of a vehicle's lights, in the order of time; what the scenario says nothing of stays unset."""
     kinds = osi("osi3.osi_object_pb2").MovingObject.VehicleClassification
     state, states_over_time = kinds.LightState(), []
-    played = [
-        lit_action
-        for lit_action in motion.actions
-        if lit_action.actor == entity.name and isinstance(lit_action.action, LightStateAction)
-    ]
-    for lit_action in sorted(played, key=lambda lit_action: lit_action.start):
-        for name, lit in LIGHTS.get(lit_action.action.light, ()):
+    played = [action for action in motion.actions if action.actor == entity.name]
+    for action in sorted(played, key=lambda action: action.start):
+        if not isinstance(action.action, LightStateAction):
+            continue
+        for name, lit in LIGHTS.get(action.action.light, ()):
             off = f"{lit.partition('_STATE_')[0]}_STATE_OFF"
             states = kinds.LightState.DESCRIPTOR.fields_by_name[name].enum_type.values_by_name
-            setattr(state, name, states[off if lit_action.action.mode == "off" else lit].number)
-        kept = kinds.LightState()
-        kept.CopyFrom(state)
-        states_over_time.append((lit_action.start, kept))
+            setattr(state, name, states[off if action.action.mode == "off" else lit].number)
+        states_over_time.append((action.start, deepcopy(state)))
     return states_over_time
 
 
@@ -249,18 +246,13 @@ def _template(entity: Entity, number: int) -> Any:
         kind = "OTHER" if (category := entity.vehicle_category) is None else KINDS.get(category, category.name)
         made.vehicle_classification.type = kinds.VehicleClassification.Type.Value(f"TYPE_{kind}")
         made.vehicle_classification.has_trailer = entity.trailer is not None
-        _axle_places(made.vehicle_attributes, entity)
+        # axles from the middle of the box; without axles the reference point stands for the rear one
+        attributes, axles = made.vehicle_attributes, entity.axles
+        rear = None if axles is None else axles.rear
+        places = [(attributes.bbcenter_to_rear, *((0.0, 0.0) if rear is None else (rear.position_x, rear.position_z)))]
+        if axles is not None and axles.front is not None:
+            places.append((attributes.bbcenter_to_front, axles.front.position_x, axles.front.position_z))
+            attributes.radius_wheel = 0.5 * axles.front.wheel_diameter
+        for vector, ahead, up in places:
+            vector.x, vector.y, vector.z = ahead - box.center_x, -box.center_y, up - box.center_z
     return made
-
-
-def _axle_places(attributes: Any, entity: Entity) -> None:
-    """Axles from the middle of the box; without axles the reference point stands for the rear one."""
-    box, axles = entity.bounding_box, entity.axles
-    rear = None if axles is None else axles.rear
-    x, z = (0.0, 0.0) if rear is None else (rear.position_x, rear.position_z)
-    places = [(attributes.bbcenter_to_rear, x, z)]
-    if axles is not None and axles.front is not None:
-        places.append((attributes.bbcenter_to_front, axles.front.position_x, axles.front.position_z))
-        attributes.radius_wheel = 0.5 * axles.front.wheel_diameter
-    for vector, ahead, up in places:
-        vector.x, vector.y, vector.z = ahead - box.center_x, -box.center_y, up - box.center_z

@@ -34,7 +34,7 @@ MAX_ERROR = 0.15  # [m]; where the centre's standard error is larger (ends of th
 TILT_PENALTY = 4.0  # ridge on the tilt's coefficients [-]; chosen likewise, 1 to 10 give the same within 1 %
 CORRELATION = 0.9  # correlation of a driver's offset after 1 s, as assumed by the weights; 1 would let the level drift
 ROUNDS = 4  # of reweighting; the line moves by under 1 mm after three
-HUBER = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
+HUBER_LIMIT = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
 BEND_PENALTY = 0.1  # [-]
 COUNT_WINDOW = 100.0  # of road, in which passages are counted [m]
 MIN_PASSAGES = 10  # per window, below which the lane ends
@@ -116,7 +116,7 @@ def _robust_least_squares(
         coefficients = np.linalg.solve(normal, rows.T @ (weight * values))
         innovation = values - rows @ coefficients
         spread = MAD_TO_SD * np.median(np.abs(innovation))
-        weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(innovation), 1e-12))
+        weight = np.minimum(1.0, HUBER_LIMIT * spread / np.maximum(np.abs(innovation), 1e-12))
     names, number = np.unique(cluster, return_inverse=True)
     scores = np.zeros((len(names), rows.shape[1]))
     np.add.at(scores, number, rows * (weight * innovation)[:, None])

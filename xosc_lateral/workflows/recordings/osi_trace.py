@@ -174,7 +174,7 @@ KINDS = {
 
 LANE_FIELDS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")  # what is kept besides objects
 LEAP_DISTANCE = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
-COLUMNS = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
+ROW_SIZE = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 
 
 @dataclass
@@ -272,7 +272,7 @@ class _Collected:
 
     def recorded(self, notes: list[str]) -> Recorded:
         """All of it, in order."""
-        rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, COLUMNS)
+        rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, ROW_SIZE)
         notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in self.left_out.items())]
         rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
         new = np.r_[True, (np.diff(rows[:, :2], axis=0) != 0).any(axis=1)] if len(rows) else np.zeros(0, dtype=bool)

@@ -51,15 +51,13 @@ def page_of(facts: dict[str, Any], plans: Sequence[VehiclePlan], network: RoadNe
         "appearing and leaving. What maneuvers do not say, how somebody moves in the lane, is left to the driver "
         "profiles in `drivers.csv`."
     )
-    in_lane = f"in lane {numbers['across_in_lane_rms']:.2f} m"
-    page.key_figures(
-        [
-            KeyFigure(f"{numbers['vehicles']}", "vehicles", f"{numbers['duration']:g} s"),
-            KeyFigure(f"{numbers['lane_changes']}", "lane changes"),
-            KeyFigure(f"{numbers['along_p95']:.2f} m", "along the road, 95 % within", "recorded less maneuvers"),
-            KeyFigure(f"{numbers['across_rms']:.2f} m", "across, rms", in_lane),
-        ]
-    )
+    figures = [
+        KeyFigure(f"{numbers['vehicles']}", "vehicles", f"{numbers['duration']:g} s"),
+        KeyFigure(f"{numbers['lane_changes']}", "lane changes"),
+        KeyFigure(f"{numbers['along_p95']:.2f} m", "along the road, 95 % within", "recorded less maneuvers"),
+        KeyFigure(f"{numbers['across_rms']:.2f} m", "across, rms", f"in lane {numbers['across_in_lane_rms']:.2f} m"),
+    ]
+    page.key_figures(figures)
     page.section(
         "Player",
         "From above. Filled boxes are the recorded vehicles, dashed outlines (nominal) the places that the maneuvers "
@@ -130,8 +128,8 @@ def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -
     way_on_lane = vehicle.way[row]
     poses = network.lane_to_world(road, lane, s, way_on_lane * offset)
     speed = plan.speed.at(held)
-    active = (time >= begin - 1e-9) & (time <= end + FRAME)
-    activity = np.where(active, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
+    is_there = (time >= begin - 1e-9) & (time <= end + FRAME)
+    activity = np.where(is_there, Activity.ACTIVE, 0).astype(np.uint8)
     heading = poses.heading + np.where(way_on_lane < 0, np.pi, 0.0)
     turned = poses.x, poses.y, poses.z, heading, poses.pitch, poses.roll
     box = BoundingBox(vehicle.centre, 0.0, 0.5 * vehicle.height, vehicle.length, vehicle.width, vehicle.height)
@@ -142,9 +140,8 @@ def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -
 def _spread(plans: Sequence[VehiclePlan]) -> Figure:
     figure = Figure(1, 2, height=130.0, legend=True)
     left, right = figure.panels
-    along, across, in_lane = (
-        np.concatenate([getattr(plan.residuals, name) for plan in plans]) for name in ("along", "across", "in_lane")
-    )
+    parts = [(plan.residuals.along, plan.residuals.across, plan.residuals.in_lane) for plan in plans]
+    along, across, in_lane = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     density, edges = np.histogram(np.clip(along, -1.0, 1.0), np.linspace(-1.0, 1.0, 81), density=True)
     left.steps(edges, density, SAMPLED)
     for part, color, label in ((in_lane, MEASURED, "road-following"), (~in_lane, SAMPLED, "in maneuvers")):

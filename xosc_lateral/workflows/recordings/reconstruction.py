@@ -139,9 +139,8 @@ def facts_of(made: Reconstruction) -> dict[str, Any]:
 
 def summary(plans: Sequence[VehiclePlan], duration: float) -> dict[str, float]:
     """Counts, and residuals of all vehicles together. [m], [s]"""
-    along, across, in_lane = (
-        np.concatenate([getattr(plan.residuals, name) for plan in plans]) for name in ("along", "across", "in_lane")
-    )
+    parts = [(plan.residuals.along, plan.residuals.across, plan.residuals.in_lane) for plan in plans]
+    along, across, in_lane = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     driven = sum(float(plan.speed.time[-1] - plan.speed.time[0]) for plan in plans)
     corners = sum(len(plan.speed.time) - 2 for plan in plans)
     return {

@@ -21,8 +21,8 @@ from xosc_lateral.workflows.recordings.cuts import require_along_lanes
 from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
 from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
+from xosc_lateral.workflows.recordings.importers.tracks import LaneShape
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.lane_shapes import LaneShape
 from xosc_lateral.workflows.recordings.recorded import Track
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
 from xosc_lateral.world.road.network import RoadNetwork
@@ -196,7 +196,7 @@ def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     length, height, speed = (
         table[name].to_numpy() for name in ("dimension_length", "dimension_height", "velocity_magnitude")
     )
-    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else None
+    width = table[dlr_ht.WIDTH_COLUMN].to_numpy() if dlr_ht.WIDTH_COLUMN in table else None
     short = _short(table["id"].astype(str).to_numpy(dtype=str))
     names = tuple(short[str(name)] for name in table["id"][np.r_[True, np.diff(vehicle) != 0]])
     place = x - made.origin[0], y - made.origin[1], np.full(len(x), np.nan)  # headings are not recorded
@@ -210,14 +210,14 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
-    table, meta, about = levelx.read_recording_files(files[0])
-    rate = levelx.frame_rate(about, files[0])
-    if "latLaneCenterOffset" in table.columns:
+    recording = levelx.Recording.read(files[0])
+    table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
+    if recording.is_exid:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
-    levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
-    lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
+    recording.require(levelx.HIGHD_COLUMNS)
+    lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
     table = table.sort_values(["id", "frame"], ignore_index=True)
     meta = meta.set_index("id").loc[table["id"]]
     kind = meta["class"].astype(str).str.lower().to_numpy(dtype=str)
@@ -236,7 +236,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     )
     x0 = float(np.floor(table["x"].min() - ROAD_MARGIN))
     plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + ROAD_MARGIN)) - x0]])
-    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, files[0])
+    return _made(WrittenRoad(f"highd-{recording.number}", plan, left, right), tracks, files[0])
 
 
 def _short(names: NDArray[np.str_]) -> dict[str, str]:

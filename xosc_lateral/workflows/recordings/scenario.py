@@ -33,7 +33,7 @@ HALF_FRAME = 0.01
 which is therefore written as much later; for frames of 0.02 s, those of `play`. Else braking from 30 m/s to a stop ends
 0.3 m short. [s]"""
 
-VERTICES = 0.2  # between the vertices of a recorded path [s]
+VERTEX_STEP = 0.2  # between the vertices of a recorded path [s]
 
 
 def reconstructed_scenario(
@@ -229,7 +229,7 @@ class _Vehicle:
     def follow_recorded_path(self, event: etree._Element) -> None:
         """The recorded places themselves, at their times."""
         name, vehicle, begin = self._plan.name, self._plan.vehicle, self._plan.present[0]
-        time = np.append(np.arange(begin, vehicle.time[-1] - 0.5 * VERTICES, VERTICES), vehicle.time[-1])
+        time = np.append(np.arange(begin, vehicle.time[-1] - 0.5 * VERTEX_STEP, VERTEX_STEP), vehicle.time[-1])
         x, y = (np.interp(time, vehicle.time, values) for values in (vehicle.x, vehicle.y))
         heading = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
         follow = sub(build.private_action(event, f"{name}_path"), "RoutingAction/FollowTrajectoryAction")

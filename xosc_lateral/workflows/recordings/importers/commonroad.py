@@ -23,9 +23,15 @@ from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
 from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
-from xosc_lateral.workflows.recordings.importers.tracks import import_placed, require_lanes
+from xosc_lateral.workflows.recordings.importers.tracks import (
+    LaneShape,
+    curvature_along,
+    graph_of_shapes,
+    import_placed,
+    place_in_shapes,
+    require_lanes,
+)
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.lane_shapes import LaneShape, curvature_along, lane_graph, place_in_shapes
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 
@@ -54,7 +60,7 @@ def read_obstacles(path: Path, label: str) -> tuple[Tracks, list[_Lanelet], Lane
     left = np.array([numbers.get(name, -1) for name in beside], dtype=int)
     following = [[numbers[name] for name in lanelet.successor if name in numbers] for lanelet in lanelets]
     version = str(getattr(scenario, "scenario_id", "unknown"))
-    return _tracks(scenario, path, label), shapes, lane_graph(shapes, left, following), version
+    return _tracks(scenario, path, label), shapes, graph_of_shapes(shapes, left, following), version
 
 
 def _opened(path: Path) -> Any:

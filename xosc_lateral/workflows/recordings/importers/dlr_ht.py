@@ -50,7 +50,7 @@ from xosc_lateral.workflows.recordings.lane_graph import find_neighbours
 from xosc_lateral.workflows.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.world.road.reference_line import ReferenceLine, fit_reference_line
 
-LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
+LANE_COUNT = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
 CLASSES = ("car", "van", "truck", "motorbike")
 COLUMNS = (
@@ -63,7 +63,7 @@ CUTOFF_FREQUENCIES = (0.5, 0.6)
 ATTENUATION = 40.0  # of what is faster; a third of a millimetre of its 3 cm is left [dB]
 HIGHEST_FREQUENCY = 0.1  # of what these tracks show of driving [Hz]
 POSITION_RESOLUTION = 0.01  # that positions are given in [m]
-WIDTH = "dimension_width"  # read where it is there: nothing of an import needs it
+WIDTH_COLUMN = "dimension_width"  # read where it is there: nothing of an import needs it
 LICENCE = (
     "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005), said by "
     "others to be under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are "
@@ -87,7 +87,7 @@ def import_dlr_ht(
     vehicle, time, length = (tracks[name].to_numpy() for name in ("vehicle", "time", "dimension_length"))
     s = np.where(road.forward, road.s, road.reference.length - road.s)
     is_truck, where = kind == "truck", np.round(time / STEP).astype(np.int64) * 2 + road.forward
-    on_left, on_right = road.lane < LANES - 1, road.lane > 0
+    on_left, on_right = road.lane < LANE_COUNT - 1, road.lane > 0
     near = find_neighbours(where, road.lane, s, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
     columns = {
         "drive": "ht-" + tracks["id"].astype(str),
@@ -97,7 +97,7 @@ def import_dlr_ht(
         "speed": tracks["velocity_magnitude"].to_numpy(),
         "acceleration": tracks["acceleration_signed"].to_numpy(),
         "lane_index": road.lane,
-        "lane_count": LANES,
+        "lane_count": LANE_COUNT,
         **near,
         "vehicle_class": kind,
         "is_truck": is_truck.astype(np.float64),
@@ -165,7 +165,8 @@ def _read_csv(stream: io.BytesIO, source: Path) -> pd.DataFrame:
             raise FormatError(f"no column {', '.join(missing)}; is this a DLR HT trajectory file?", path=source, line=1)
         stream.seek(0)
         try:
-            frame = pd.read_csv(stream, usecols=[name for name in (*COLUMNS, WIDTH) if name in head], engine="pyarrow")
+            columns = [name for name in (*COLUMNS, WIDTH_COLUMN) if name in head]
+            frame = pd.read_csv(stream, usecols=columns, engine="pyarrow")
         except ValueError as error:  # pandas' and pyarrow's parser errors are both of this kind
             raise FormatError(f"can't be read as CSV: {error}", path=source) from error
     for name in frame.columns.drop("timestamp"):
@@ -242,7 +243,7 @@ def _place_in_lanes(
         if not remaining:
             break
         lanes = []
-        for index in range(LANES):
+        for index in range(LANE_COUNT):
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
             passage = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
             second = _each(passage, round(1.0 / STEP))
@@ -257,13 +258,13 @@ def _place_in_lanes(
 
 
 def _levels(d: FloatArray) -> FloatArray:
-    """Mean lateral position of the lanes, right to left: the innermost `LANES` clusters (two-means)."""
+    """Mean lateral position of the lanes, right to left: the innermost `LANE_COUNT` clusters (two-means)."""
     low, high = np.quantile(d, [0.2, 0.95])
-    levels = np.linspace(low, high, LANES)
+    levels = np.linspace(low, high, LANE_COUNT)
     for _ in range(50):
         nearest = np.abs(d[:, None] - levels).argmin(axis=1)
         close = np.abs(d - levels[nearest]) < 2.0
-        levels = np.array([d[close & (nearest == k)].mean() for k in range(LANES)])
+        levels = np.array([d[close & (nearest == k)].mean() for k in range(LANE_COUNT)])
     return levels
 
 

@@ -20,19 +20,8 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.files import sumo
 from xosc_lateral.files.columns import require_row_step
-from xosc_lateral.files.sumo import (
-    TRUCKS,
-    WIDTH,
-    SumoLane,
-    SumoNet,
-    fcd_vehicles,
-    number_of,
-    read_sumo_net,
-    read_vehicle_types,
-    usual_length,
-    wrong_element,
-)
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
@@ -41,7 +30,7 @@ from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_co
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
 
 LICENCE = "that of the simulation"
-ROW = ("time", "name", "lane", "pos", "side", "speed", "kind", "x", "y", "angle")
+ROW_COLUMNS = ("time", "name", "lane", "pos", "side", "speed", "kind", "x", "y", "angle")
 NET_ENDINGS = (".net.xml", ".net.xml.gz")
 REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m [-]
 
@@ -53,16 +42,16 @@ def import_fcd(
         help="Road network (.net.xml): lanes, side of the road, who is on the next edge.")] = None,
     types: Annotated[str | Path | None, flag(kind=Path | None,
         help="File with the vehicle types (.rou.xml): lengths.")] = None,
-    lane_width: Annotated[float, flag(help="Without a network. [m]", min=1, max=10)] = WIDTH,
+    lane_width: Annotated[float, flag(help="Without a network. [m]", min=1, max=10)] = sumo.LANE_WIDTH,
 ) -> ImportedDrives:  # fmt: skip
     """SUMO's FCD output of a run with the sublane model: a drive for every vehicle.
 
     It is a truck when its type's name or class says so.
     """
-    vehicles = fcd_vehicles(source, "a vehicle outside a timestep")
-    known = None if net is None else read_sumo_net(Path(net))
-    vehicle_types = read_vehicle_types(None if types is None else Path(types))
-    rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW))
+    vehicles = sumo.fcd_vehicles(source, "a vehicle outside a timestep")
+    known = None if net is None else sumo.read_sumo_net(Path(net))
+    vehicle_types = sumo.read_vehicle_types(None if types is None else Path(types))
+    rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW_COLUMNS))
     rows["is_inner"] = rows["lane"].astype(str).str.startswith(":")
     rows = rows[~rows["is_inner"]] if known is None else rows
     if rows.empty:
@@ -88,22 +77,22 @@ def _rows(vehicles: Iterator[tuple[float, Any]], source: Path) -> Iterator[tuple
     for time, element in vehicles:
         if element.get("posLat") is None:
             what = "no posLat: it is written with the sublane model and --fcd-output.attributes all"
-            raise wrong_element(what, element, source)
+            raise sumo.wrong_element(what, element, source)
         if element.get("lane") is None or element.get("id") is None:
-            raise wrong_element("no id or lane", element, source)
-        place = (number_of(element, name, source) for name in ("pos", "posLat", "speed"))
+            raise sumo.wrong_element("no id or lane", element, source)
+        place = (sumo.number_of(element, name, source) for name in ("pos", "posLat", "speed"))
         seen = (float(element.get(name, "nan")) for name in ("x", "y", "angle"))
         yield time, element.get("id"), element.get("lane"), *place, element.get("type", ""), *seen
 
 
 def _drive_table(
-    rows: pd.DataFrame, net: SumoNet, types: dict[str, tuple[float, str]], left_hand: bool, source: Path
+    rows: pd.DataFrame, net: sumo.SumoNet, types: dict[str, tuple[float, str]], left_hand: bool, source: Path
 ) -> pd.DataFrame:
     vehicle, names = rows["name"].factorize()
     time, side, speed = (rows[name].to_numpy() for name in ("time", "side", "speed"))
-    kinds = [types.get(kind.partition("@")[0], (usual_length(kind), kind)) for kind in rows["kind"]]
+    kinds = [types.get(kind.partition("@")[0], (sumo.usual_length(kind), kind)) for kind in rows["kind"]]
     length = np.array([size for size, _ in kinds])
-    is_truck = np.array([any(word in kind.lower() for word in TRUCKS) for _, kind in kinds])
+    is_truck = np.array([any(word in kind.lower() for word in sumo.TRUCKS) for _, kind in kinds])
     # lanes of an edge lie side by side, counted from the right here
     numbers, following = _driving_lanes(net)
     edges: dict[str, list[int]] = {}
@@ -128,23 +117,23 @@ def _drive_table(
     })  # fmt: skip
 
 
-def _driving_lanes(net: SumoNet) -> tuple[dict[str, int], list[list[int]]]:
+def _driving_lanes(net: sumo.SumoNet) -> tuple[dict[str, int], list[list[int]]]:
     """Numbers of the lanes that vehicles drive on, and those that each leads to."""
     numbers = {name: k for k, name in enumerate(name for name, lane in net.lanes.items() if lane.is_driving)}
     return numbers, [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
 
 
-def _net_of(rows: pd.DataFrame, width: float) -> SumoNet:
+def _net_of(rows: pd.DataFrame, width: float) -> sumo.SumoNet:
     """What the output alone says of the lanes: those in which somebody was, and all on their right."""
     last, end = dict[str, int](), dict[str, float]()
     for name, place in zip(rows["lane"], rows["pos"], strict=True):
         edge, _, index = name.rpartition("_")
         last[edge], end[edge] = max(last.get(edge, 0), int(index)), max(end.get(edge, 0.0), place)
-    lanes = [SumoLane(edge, k, width, end[edge], True) for edge, top in last.items() for k in range(top + 1)]
-    return SumoNet(lanes={f"{lane.edge}_{lane.index}": lane for lane in lanes})
+    lanes = [sumo.SumoLane(edge, k, width, end[edge], True) for edge, top in last.items() for k in range(top + 1)]
+    return sumo.SumoNet(lanes={f"{lane.edge}_{lane.index}": lane for lane in lanes})
 
 
-def _left_hand(rows: pd.DataFrame, net: SumoNet, stated: bool | None, source: Path) -> bool:
+def _left_hand(rows: pd.DataFrame, net: sumo.SumoNet, stated: bool | None, source: Path) -> bool:
     """Whether sides are counted from the left kerb: as the network says, which positions must not contradict."""
     lanes = [net.lanes[name] for name in rows["lane"]]
     across = np.array([lane.index * lane.width for lane in lanes]) + rows["side"].to_numpy()
@@ -159,7 +148,7 @@ def _left_hand(rows: pd.DataFrame, net: SumoNet, stated: bool | None, source: Pa
 
 
 # ---- for `reconstruct`: the lanes of a network as lines, and where vehicles' rear axles were -------------------------
-def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:
+def lanes_of_net(net: sumo.SumoNet, path: Path) -> list[DrivenLane]:
     """Lanes that vehicles drive on, those inside junctions included. Raises `FormatError`: a lane without a shape."""
     numbers, following = _driving_lanes(net)
     if not numbers:
@@ -188,13 +177,13 @@ def lanes_of_net(net: SumoNet, path: Path) -> list[DrivenLane]:
 def read_fcd(path: Path) -> Tracks:
     """Tracks of the rear axles, which pass where the front did: SUMO turns vehicles about their front."""
     rows, names, types = list[tuple[float, ...]](), dict[str, int](), list[str]()
-    for time, element in fcd_vehicles(path, outside := "a vehicle without id, or outside a timestep"):
+    for time, element in sumo.fcd_vehicles(path, outside := "a vehicle without id, or outside a timestep"):
         if (name := element.get("id")) is None:
-            raise wrong_element(outside, element, path)
+            raise sumo.wrong_element(outside, element, path)
         if name not in names:
             names[name] = len(names)
             types.append(element.get("type", "").lower())
-        rows.append((names[name], time, *(number_of(element, key, path) for key in ("x", "y", "angle", "speed"))))
+        rows.append((names[name], time, *(sumo.number_of(element, key, path) for key in ("x", "y", "angle", "speed"))))
     if not rows:
         raise NotEnoughDataError(f"{path}: no vehicle")
     values = np.array(rows)
@@ -203,8 +192,8 @@ def read_fcd(path: Path) -> Tracks:
     same = vehicle[1:] == vehicle[:-1]
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
-    kind = np.array(["truck" if any(word in name for word in TRUCKS) else "" for name in types])[vehicle]
-    length = np.array([usual_length(name) for name in types])[vehicle]
+    kind = np.array(["truck" if any(word in name for word in sumo.TRUCKS) else "" for name in types])[vehicle]
+    length = np.array([sumo.usual_length(name) for name in types])[vehicle]
     heading = 0.5 * np.pi - np.radians(angle)
     for part in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):
         first, behind = part[0], REAR_FROM_FRONT * length[part[0]]

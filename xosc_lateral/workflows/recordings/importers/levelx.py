@@ -19,7 +19,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -55,91 +55,99 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> Importe
         raise FormatError("no XX_tracks.csv in this folder", path=source)
     parts, layouts, steps = [], set[str](), set[float]()
     for path in files:
-        tracks, meta, recording = read_recording_files(path)
-        steps.add(step := 1.0 / frame_rate(recording, path))
-        is_exid = "latLaneCenterOffset" in tracks.columns
-        layouts.add("exiD" if is_exid else "highD")
-        if is_exid:
-            parts.append(_from_exid(tracks, meta, step, path, settings))
-        else:
-            parts.append(_from_highd(tracks, meta, recording, step, path, settings))
+        recording = Recording.read(path)
+        layouts.add("exiD" if recording.is_exid else "highD")
+        steps.add(1.0 / recording.frame_rate)
+        parts.append((_from_exid if recording.is_exid else _from_highd)(recording, settings))
     if len(layouts) > 1 or len(steps) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
     about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings)}
     return imported(pd.concat(parts, ignore_index=True), sources=files, step=steps.pop(), **about)
 
 
-def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
-    """Tracks, their meta table and that of the recording."""
-    tables = []
-    for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"):
-        file = path.with_name(path.name.replace("_tracks.csv", ending))
-        if not file.exists():
-            what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
-            raise FormatError(what, path=file)
-        tables.append(read_table(file))
-        if tables[-1].empty:
-            raise NotEnoughDataError(f"{file}: has no rows")
-    tracks, meta, recording = tables
-    return tracks, meta, recording
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording's tracks, a row of `meta` for each of them, and one of `about` for all."""
+
+    path: Path  # of the tracks
+    tracks: pd.DataFrame
+    meta: pd.DataFrame
+    about: pd.DataFrame
+
+    @classmethod
+    def read(cls, path: Path) -> Recording:
+        """By the path of its tracks. Raises `FormatError`, `NotEnoughDataError`."""
+        tables = []
+        for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"):
+            file = path.with_name(path.name.replace("_tracks.csv", ending))
+            if not file.exists():
+                what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
+                raise FormatError(what, path=file)
+            tables.append(read_table(file))
+            if tables[-1].empty:
+                raise NotEnoughDataError(f"{file}: has no rows")
+        return cls(path, *tables)
+
+    @property
+    def number(self) -> str:
+        """As it is counted in the data set."""
+        return self.path.name.split("_")[0]
+
+    @property
+    def is_exid(self) -> bool:
+        """Else it is of highD."""
+        return "latLaneCenterOffset" in self.tracks.columns
+
+    @property
+    def frame_rate(self) -> float:
+        """[1/s]"""
+        rate = self._stated("frameRate")
+        if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+            raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=self.path)
+        return float(rate)
+
+    def markings(self, side: str) -> FloatArray:
+        """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
+        return np.array([float(part) for part in self._stated(f"{side}LaneMarkings").split(";")])
+
+    def _stated(self, column: str) -> str:
+        if column not in self.about.columns or self.about.empty:
+            raise FormatError(f"no value of {column} in the recording's meta file", path=self.path)
+        return str(self.about[column].iloc[0])
+
+    def require(self, columns: Sequence[str]) -> None:
+        """Refuse tracks that lack a column."""
+        if missing := [name for name in columns if name not in self.tracks.columns]:
+            raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=self.path, line=1)
 
 
-def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
-    """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
-    return np.array([float(part) for part in cell(recording, f"{side}LaneMarkings", path).split(";")])
-
-
-def cell(frame: pd.DataFrame, column: str, path: Path) -> str:
-    """Of a meta file's only row."""
-    if column not in frame.columns or frame.empty:
-        raise FormatError(f"no value of {column} in the recording's meta file", path=path)
-    return str(frame[column].iloc[0])
-
-
-def frame_rate(recording: pd.DataFrame, path: Path) -> float:
-    """Of a recording. [1/s]"""
-    rate = cell(recording, "frameRate", path)
-    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
-        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
-    return float(rate)
-
-
-def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
-    """Refuse a table that lacks a column."""
-    missing = [name for name in columns if name not in frame.columns]
-    if missing:
-        raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=path, line=1)
-
-
-# ---- highD -----------------------------------------------------------------------------------------------------------
-def _from_highd(
-    tracks: pd.DataFrame, meta: pd.DataFrame, recording: pd.DataFrame, step: float, path: Path, settings: CutSettings
-) -> pd.DataFrame:
-    require(tracks, HIGHD_COLUMNS, path)
-    tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
-    meta = meta.set_index("id").reindex(tracks["id"])
+def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+    recording.require(HIGHD_COLUMNS)
+    step, tracks = 1.0 / recording.frame_rate, recording.tracks.sort_values(["id", "frame"], ignore_index=True)
+    meta = recording.meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
     way = np.where(rightwards, 1.0, -1.0)
     velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
-    require_lane_direction(way * np.sign(velocity), np.abs(velocity), "the recording's drivingDirection", path)
+    where = "the recording's drivingDirection"
+    require_lane_direction(way * np.sign(velocity), np.abs(velocity), where, recording.path)
     # y points down: for traffic towards +x the left is at smaller y.
     x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
     left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
     lane, offset, width, count = (np.zeros(len(tracks)) for _ in range(4))
     for mine, side, sign in ((rightwards, "lower", -1.0), (~rightwards, "upper", 1.0)):
-        marks = np.sort(sign * markings(recording, side, path))
+        marks = np.sort(sign * recording.markings(side))
         index = np.searchsorted(marks, left[mine]) - 1
         inside = np.clip(index, 0, len(marks) - 2)
         lane[mine] = np.where(index == inside, index, -1)
         offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
         width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
-    lane_number = lane.astype(np.int64)
-    frame, kind = tracks["frame"].to_numpy(), meta["class"].astype(str).str.lower().to_numpy()
-    is_truck = np.isin(kind, TRUCKS)
-    where, length, on_left = frame * 2 + rightwards, tracks["width"].to_numpy(), lane_number < count - 1
-    near = find_neighbours(where, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=lane_number > 0)
+    lane_number, frame = lane.astype(np.int64), tracks["frame"].to_numpy()
+    kind = meta["class"].astype(str).str.lower().to_numpy()
+    is_truck, instant, length = np.isin(kind, TRUCKS), frame * 2 + rightwards, tracks["width"].to_numpy()
+    on_left, on_right = lane_number < count - 1, lane_number > 0
+    near = find_neighbours(instant, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
     columns = {
-        "drive": f"highd-{path.name.split('_')[0]}-" + tracks["id"].astype(str),
+        "drive": f"highd-{recording.number}-" + tracks["id"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,
@@ -153,13 +161,11 @@ def _from_highd(
     return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
-# ---- exiD ------------------------------------------------------------------------------------------------------------
-def _from_exid(
-    tracks: pd.DataFrame, meta: pd.DataFrame, step: float, path: Path, settings: CutSettings
-) -> pd.DataFrame:
-    require(tracks, EXID_COLUMNS, path)
-    tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
-    kind = meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
+def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+    recording.require(EXID_COLUMNS)
+    step, tracks = 1.0 / recording.frame_rate, recording.tracks.sort_values(["trackId", "frame"], ignore_index=True)
+    classes = recording.meta.set_index("trackId").reindex(tracks["trackId"])["class"]
+    kind = classes.astype(str).str.lower().to_numpy()
     offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
     vehicle, frame = tracks["trackId"].to_numpy(), tracks["frame"].to_numpy()
     known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
@@ -169,10 +175,10 @@ def _from_exid(
     jump &= np.r_[False, vehicle[1:] == vehicle[:-1]]
     lane = np.cumsum(jump).astype(np.int64)
     lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
-    offset = offset * _left_sign(lateral, tracks, vehicle, step, path)
+    offset = offset * _left_sign(lateral, tracks, vehicle, step, recording.path)
     is_truck = np.isin(kind, TRUCKS)
     columns = {
-        "drive": f"exid-{path.name.split('_')[0]}-" + tracks["trackId"].astype(str),
+        "drive": f"exid-{recording.number}-" + tracks["trackId"].astype(str),
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,

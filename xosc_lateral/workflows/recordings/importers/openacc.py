@@ -46,7 +46,7 @@ LANE_WIDTH = 3.5  # assumed: usual on rural roads; the campaign gives none [m]
 HIGHEST_FREQUENCY = 1.5  # runs at 5 Hz keep what is slower; noise there (2e-8 m2/Hz) is a tenth of the movement [Hz]
 POSITION_RESOLUTION = 1e-3  # noise of the positions [m]
 GRID_STEP = 1.0  # points of the centre line are so far apart [m]
-SMOOTHING, ROUNDS = 12.0, 5  # Gaussian by which the centre line follows the mean path [m], and how often
+SMOOTHING_LENGTH, ROUNDS = 12.0, 5  # Gaussian by which the centre line follows the mean path [m], and how often
 RETURN_DISTANCE = 5.0  # a lap is over where a car is as near to where it began [m] ...
 PLACING_STEPS = 4  # of the search for the point of a line abreast: each leaves less than a tenth of the last [-]
 MINIMUM_LAP = 500.0  # ... and has come so far since [m]
@@ -73,8 +73,7 @@ def import_openacc(
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
     frames = []
     for side in (1.0, -1.0):  # counter-clockwise, clockwise: two lanes
-        same = [car for car in cars if car.turn == side]
-        if same:
+        if same := [car for car in cars if car.turn == side]:
             frames += _placed(same, _centre_line(same), lane_width)
     table = pd.concat(frames, ignore_index=True)
     note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"
@@ -239,7 +238,7 @@ def _even(points: FloatArray) -> _Loop:
 def _smooth(values: FloatArray) -> FloatArray:
     """Periodic columns through the Gaussian, shape of the values, (n,) or (n, 2)."""
     frequency = np.fft.rfftfreq(len(values), GRID_STEP)
-    gain = np.exp(-0.5 * (2.0 * np.pi * SMOOTHING * frequency) ** 2)
+    gain = np.exp(-0.5 * (2.0 * np.pi * SMOOTHING_LENGTH * frequency) ** 2)
     spectrum = np.fft.rfft(values, axis=0)
     return np.asarray(np.fft.irfft((spectrum.T * gain).T, len(values), axis=0))
 

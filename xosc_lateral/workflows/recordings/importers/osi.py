@@ -24,9 +24,16 @@ from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, MOVING_SPEED, CutSettings
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
-from xosc_lateral.workflows.recordings.importers.tracks import import_placed, place_on_road, require_lanes
+from xosc_lateral.workflows.recordings.importers.tracks import (
+    Strip,
+    graph_of_shapes,
+    import_placed,
+    middle,
+    place_in_shapes,
+    place_on_road,
+    require_lanes,
+)
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.lane_shapes import Strip, lane_graph, middle, place_in_shapes
 from xosc_lateral.workflows.recordings.osi_trace import Recorded, read_osi
 
 LICENCE = "that of the trace"
@@ -125,7 +132,7 @@ def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
             if other in numbers and courses[k] @ courses[numbers[other]] > 0.0:
                 left[k] = numbers[other]
     following = [[numbers[n] for n in lane.onward[ways[name]] if n in numbers] for name, lane in lanes.items()]
-    return strips, lane_graph(strips, left, following)
+    return strips, graph_of_shapes(strips, left, following)
 
 
 def _physical(recorded: Recorded) -> dict[int, _Lane]:
