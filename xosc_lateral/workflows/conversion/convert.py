@@ -1,4 +1,8 @@
-"""`convert`: a maneuver-based scenario in, a lifelike one out. Load, play, decide, sample, write, check."""
+"""`convert`: a maneuver-based scenario in, a lifelike one out. Load, play, decide, sample, write, check.
+
+A replay moves vehicles along trajectories by the clock. Where a vehicle is under test the output is reactive: it keeps
+triggers and maneuvers, and lane offsets are added.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +35,8 @@ from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 SUPPLY_TIME = 60.0
-"""Of movement that each segment of a reactive output gets at least; a run in which it lasts longer repeats it. Some of
-a driver's slow movement is seen in that time. [s]"""
+"""Movement sampled for each segment of a reactive output, at least; a run in which the segment lasts longer repeats it.
+Some of a driver's slow movement is seen in that time. [s]"""
 
 
 @spelled_out(ConvertSettings)
@@ -66,12 +70,13 @@ def convert(
     Raises
     ------
     FormatError, PlaybackError, DriverProfileError
-        With file, line and element; nothing is written then.
+        With file, line and element; no output is written then.
     """
     if variant < 1:
         raise ValueError(f"variant {variant}, they count from 1")
     settings = ConvertSettings.of(**options)
     source = Path(scenario)
+    # without an output, file references in the bytes are as from the source's folder
     target = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
     claim([None if output is None else target, page], [source], force=force)
@@ -96,7 +101,7 @@ def convert_scenario(
 
     - `output`: where the converted one goes; its folder has to exist
     - `variant_index`: from 0; each has other offsets
-    - `report`: where the caller will write a report: refused, as `output` is, where a file lies that is read here
+    - `report`: where the caller will write a report; like `output`, it must be none of the files read here
     - `saves`: write the output; else the result holds its bytes, with file references as seen from `output`'s folder
 
     Raises `XoscLateralError`: when the input is at fault; nothing is written then; `OSError`: when the output can't be
@@ -115,17 +120,17 @@ def convert_scenario(
         sampled = sample(plan)
         written = write(plan, sampled)
         checked = check(plan, written)
-        if plan.saves and not plan.is_replay:  # which is in its place already
+        if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
             write_atomically(plan.output, checked.file.data)
         return _conversion(plan, checked)
 
 
 def sample(plan: Plan) -> Enriched:
-    """Offsets of every vehicle that has a driver, for the run that they are for."""
+    """Offsets of every vehicle that has a driver, for as long as the output may run."""
     settings, played = plan.settings, plan.played
     try:
         return enrich(
-            plan.extended.motion,  # all else of the extended run is that of the played one
+            plan.extended.motion,  # played on beyond the end where the output is reactive, and the same up to there
             played.network,
             plan.drivers,
             seed=settings.seed,
@@ -147,24 +152,24 @@ def sample(plan: Plan) -> Enriched:
 
 
 def check(plan: Plan, written: Written) -> Written:
-    """Play a reactive output, the ego driving in several ways, and make moves smaller where they change what happens.
+    """Play a reactive output under `meaning_of`'s ways of driving, and make moves smaller where they change events.
 
     A replay follows the clock: nothing can happen otherwise.
     """
     if plan.is_replay:
         return written
     settings, source = plan.settings, plan.played.scenario
-    meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
+    source_meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
     def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
-        if chains is not written.chains:
+        if chains is not written.chains:  # those of the first trial are written already
             trial = write_with(chains, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already.
         output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = meaning.compare(output, written.vehicles.trajectories)
+        comparisons, run = source_meaning.compare(output, written.vehicles.trajectories)
         return (trial, output, run), comparisons
 
     (best, output, run), kept = keep_meaning(written.chains, plan.played.motion, attempt)
@@ -181,7 +186,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *(() if cut_off is None else (str(cut_off),)),
         *movement.warnings(),
         *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),
-        *(f"'{name}' follows a trajectory, too: {why}" for name, why in plan.unwritable.items()),
+        *(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
         *file.notes,
         *written.vehicles.frozen,
         *written.warnings,
@@ -203,7 +208,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
 
 
 def output_scenario(output: PathLike, source: Path) -> Path:
-    """Path of a converted scenario; in a folder its source's name, that of `default_output` where the source is."""
+    """A file: as it is. A folder: the source's name in it, or `default_output`'s where that is the source itself."""
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     path = output_file(output, source.name, SCENARIO_SUFFIXES)
@@ -216,9 +221,9 @@ def default_output(source: Path) -> Path:
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
 
 
-def numbered(path: Path, variant: int, variants: int) -> Path:
-    """Path of one variant: as it is when there is one alone, else with its number from 1 before the suffix."""
+def numbered(path: Path, variant_index: int, variants: int) -> Path:
+    """Path of one variant: as it is when there is one alone, else with its number, from 1, before the suffix."""
     if variants == 1:
         return path
     digits = max(2, len(str(variants)))
-    return path.with_name(f"{path.stem}_{variant + 1:0{digits}d}{path.suffix}")
+    return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")
