@@ -39,7 +39,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_rows_in_a_file_give_the_same_bytes(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     in_memory = xl.convert(scenario, scenario.with_name("a.xosc"), ego="none")
     monkeypatch.setattr(rows, "IN_MEMORY", 0.0)
-    monkeypatch.setattr(rows, "MAPPED", 0.0)
+    monkeypatch.setattr(rows, "MAPPED_MEMORY", 0.0)
     sizes: list[int] = []
     grown = rows._Store.grown
     monkeypatch.setattr(rows._Store, "grown", lambda store, size: sizes.append(size) or grown(store, size))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -75,7 +76,8 @@ def test_the_frame_holds_the_rows_of_the_csv(tmp_path: Path) -> None:
 
 def test_the_frame_is_inertial_as_the_csv_is(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(start={"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0)}, last=0.2)
-    moved = replace(played.network, header_offset=HeaderOffset(1000.0, -500.0, 20.0, 0.3))
+    moved = copy(played.network)
+    moved.header_offset = HeaderOffset(1000.0, -500.0, 20.0, 0.3)
     rows, frame = table(played.motion, moved), states_frame(played.motion, moved)
     for column in ("x", "y", "z", "h"):
         np.testing.assert_allclose(frame[column], [float(row[column]) for row in rows], atol=6e-4)
