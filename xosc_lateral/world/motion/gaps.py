@@ -144,6 +144,7 @@ _POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     """Distance between rectangles from their corners in order, row by row, (n, 4, 2) to (n,); 0: they overlap. [m]"""
+    # convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them
     from_a, apart_of_a = _beyond(a, b)
     from_b, apart_of_b = _beyond(b, a)
     return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
