@@ -85,6 +85,13 @@ def converted(scenario: Scenario, output: Path, **overrides: Any) -> WrittenScen
     )
 
 
+def reactive(scenario: Scenario, motion: NominalMotion, chains: list[OffsetChain], output: Path) -> WrittenScenario:
+    """Nobody on a trajectory: maneuvers stay, and lane offsets are added."""
+    return write_converted(
+        scenario, motion, {}, output, chains=chains, provenance=provenance(scenario), summary="seed 3"
+    )
+
+
 def vertices(scenario: Scenario) -> list[np.ndarray]:
     """Per trajectory: columns time, x, y, heading."""
     found = []
@@ -343,15 +350,7 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
 ) -> None:
     scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor)))
     motion = played(scenario)
-    write_converted(
-        scenario,
-        motion,
-        {},
-        tmp_path / "out.xosc",
-        chains=[sine_chain("Ego")],
-        provenance=provenance(scenario),
-        summary="seed 3",
-    )
+    reactive(scenario, motion, [sine_chain("Ego")], tmp_path / "out.xosc")
     schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
     again = read_scenario(tmp_path / "out.xosc")
     assert [found.name for found in again.storyboard.stories] == ["story", "xosc-lateral"]
@@ -366,15 +365,7 @@ def test_offsets_come_out_when_the_lane_offset_scenario_is_played_and_go_on(tmp_
     scenario = made(tmp_path, stop=time_condition(60), init=init, stories=stories)
     motion = played(scenario, 70.0)
     chain = sine_chain("Ego")
-    write_converted(
-        scenario,
-        motion,
-        {},
-        tmp_path / "out.xosc",
-        chains=[chain],
-        provenance=provenance(scenario),
-        summary="seed 3",
-    )
+    reactive(scenario, motion, [chain], tmp_path / "out.xosc")
     ego = played(read_scenario(tmp_path / "out.xosc"), 70.0).entities[0]
     # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left. The ring begins at a turn.
     assert ego.offset[0] == pytest.approx(chain.placed_t, abs=1e-4)
@@ -407,15 +398,7 @@ def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_pa
     path = OffsetPath(tuple(distance.tolist()), tuple(np.round(offset, 4).tolist()))
     chain = structs.replace(chain, placed_t=0.2, path=path)
     motion = played(scenario, 40.0)
-    write_converted(
-        scenario,
-        motion,
-        {},
-        tmp_path / "out.xosc",
-        chains=[chain],
-        provenance=provenance(scenario),
-        summary="seed 3",
-    )
+    reactive(scenario, motion, [chain], tmp_path / "out.xosc")
     run = played(read_scenario(tmp_path / "out.xosc"), 40.0)
     ego, nominal_ego = run.entities[0], motion.entities[0]
     driven = ego.s - ego.s[0]
@@ -453,15 +436,7 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
     motion = played(scenario, 30.0)
     path = next(p.path for p in motion.actions if p.action.name == "change")
     chains = [sine_chain("Ego"), sine_chain("Ego", path)]
-    write_converted(
-        scenario,
-        motion,
-        {},
-        tmp_path / "out.xosc",
-        chains=chains,
-        provenance=provenance(scenario),
-        summary="seed 3",
-    )
+    reactive(scenario, motion, chains, tmp_path / "out.xosc")
     # The test drive makes the change come 3 s earlier than planned.
     output = tmp_path / "out.xosc"
     output.write_text(output.read_text().replace('value="8.01"', 'value="5.01"'))

@@ -17,6 +17,7 @@ from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.loop import terms
+from xosc_lateral.drivers.loop.core_model import MIN_DRIVES
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.model import Fitted, Stage, Term, design_of, fit_model
 from xosc_lateral.drivers.loop.significance import BUDGET
@@ -40,7 +41,6 @@ def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
 STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
 ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
 MAX_TERMS = 8  # Terms of one table, at most.
-FEWEST_DRIVES = 8  # Between fewer drives nothing is compared.
 UNDONE_LEVEL = 0.01  # Probability with which an effect between drives that is as within them is taken back.
 # Why a term of the movement's size is taken back that holds within drives alone.
 UNDONE = "significant within drives, but between them the movement's size does not follow it"
@@ -156,14 +156,14 @@ def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:
     Terms are sized within drives [1]_. A profile has no levels of these very drives, so an effect that they undo, of a
     place that few drives cross, say, would be a factor of ten between drives that nobody measured.
     """
-    from scipy.stats import t
-
     coarse, part = fitted.coarse, fitted.scale_part(term)
-    _, scales, known = design_of(coarse, fitted.terms)
     seconds = np.bincount(coarse.drive[coarse.valid], minlength=coarse.drives).astype(np.float64)
     counted = int(np.count_nonzero(seconds))
-    if scales[:, part].shape[1] == 0 or counted < FEWEST_DRIVES:
+    if part.start == part.stop or counted < MIN_DRIVES:
         return False
+    from scipy.stats import t
+
+    _, scales, known = design_of(coarse, fitted.terms)
     says = coarse.by_drive(scales[:, part] @ fitted.log_sizes[part])
     level = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
     says, level = (np.sqrt(seconds) * (one - np.average(one, weights=seconds)) for one in (says, level))

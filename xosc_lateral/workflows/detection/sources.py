@@ -26,10 +26,8 @@ from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, place_tr
 from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH, read_recording
 from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.segments import ACROSS_LANE
 from xosc_lateral.world.road.network import RoadNetwork
-
-ACROSS_LANE = np.pi / 4
-"""Heading from the lane's, beyond which a vehicle does not follow it, as in `motion.segments`. [rad]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -29,7 +29,7 @@ from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMot
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
 
-_ACROSS_LANE = np.pi / 4
+ACROSS_LANE = np.pi / 4
 """Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
 
 _SPEED_SLACK = 1e-6
@@ -156,7 +156,7 @@ def _reasons(
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
         # Who overtakes on the lane of those who come towards him follows that lane.
-        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative[rows])) > np.sin(_ACROSS_LANE),
+        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative[rows])) > np.sin(ACROSS_LANE),
         SegmentKind.SLOW: motion.speed[rows] < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
         SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }

@@ -12,10 +12,10 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.world.motion.nominal import Activity, Note, PlayedAction
+from xosc_lateral.world.motion.nominal import Note, PlayedAction
 from xosc_lateral.world.player.drive import along_reference, beside_line
 from xosc_lateral.world.player.recorder import MAXIMUM_COORDINATE, MAXIMUM_SPEED, Rows
-from xosc_lateral.world.player.state import EntityState
+from xosc_lateral.world.player.state import ACTIVE, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.geometry import Arc, Line
 from xosc_lateral.world.road.network import RoadNetwork
@@ -191,8 +191,6 @@ class Simulation:
 MAXIMUM_FRAMES, MINIMUM_FRAMES = 1000, 5
 """Frames that are worked out at once: more would often be for nothing, and fewer are not worth it."""
 
-_ACTIVE = int(Activity.ACTIVE)
-
 
 class Unwatched:
     """Who moves frame by frame, and who is ahead of the run."""
@@ -245,7 +243,7 @@ class Unwatched:
 def _follows_its_lane(state: EntityState) -> bool:
     return (
         not state.is_watched
-        and state.activity == _ACTIVE | state.steered
+        and state.activity == ACTIVE | state.steered
         and state.free_pose is None
         and state.tow is None
         and state.trailer is None

@@ -79,7 +79,7 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
     return None if steps is None else RouteGuide(network, steps)
 
 
-_ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
+ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
 
 
 _ORIGIN = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -252,7 +252,7 @@ class EntityState:
     # ---- what happened to it -----------------------------------------------------------------------------------------
     def begin_frame(self) -> None:
         """Forget what happened in the frame before."""
-        self.activity = _ACTIVE | self.steered if self.active else 0
+        self.activity = ACTIVE | self.steered if self.active else 0
         self.longitudinal_taken = False
         self.speed_taken = False
         self.teleported = False
