@@ -12,6 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.lane_changes import Course
 from xosc_lateral.drivers.drives.resampling import STEP, average, nearest, resample
 
 
@@ -203,7 +204,8 @@ def grid_of(drive: Drive, rows: slice, step: float) -> FloatArray:
 def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     """Rows within the margin of a lane change, shape (n,).
 
-    A lane has changed where `lane_index` does, where the offset jumps by half a lane width and more, and where rows are
+    From where it sets off to where it has settled, and by the margin at least on both sides of the crossing. A lane has
+    changed where `lane_index` does, where the offset jumps by half a lane width and more, and where rows are
     missing while a wheel is on a marking: a camera that loses the lane there has another when it is back. None where an
     import has cut them already.
     """
@@ -211,6 +213,9 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
         return np.zeros(len(drive), dtype=np.bool_)
     at = np.flatnonzero(_changes(drive, rules))
     change = np.zeros(len(drive), dtype=np.bool_)
+    if len(at):
+        course = Course.of(drive.time, drive.offset, drive.lane_width, 2.0 * HALF_WIDTH)
+        change = course.changing(0.0, in_part=False)
     first = np.searchsorted(drive.time, drive.time[at] - rules.lane_change_margin)
     last = np.searchsorted(drive.time, drive.time[at + 1] + rules.lane_change_margin, side="right")
     for begin, end in zip(first, last, strict=True):

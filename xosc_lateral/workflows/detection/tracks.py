@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course, lane_levels
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS
-from xosc_lateral.workflows.recordings.lateral import SETTLED_OFFSET, Course, lateral_speed
-from xosc_lateral.workflows.recordings.recorded import lane_levels
 from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.05
@@ -150,7 +149,7 @@ def truth_of(track: Track) -> Truth:
     n, time = len(track), track.time
     width = track.size.width
     room = np.maximum(0.5 * (track.rows.lane_width - width), SETTLED_OFFSET)
-    course = Course(time, track.lateral, track.base, track.level, lateral_speed(time, track.lateral), room)
+    course = Course.across(time, track.lateral, track.base, track.level, room)
     keeping = track.rows.following.copy()
     keeping[:EDGE_ROWS], keeping[max(n - EDGE_ROWS, 0) :] = False, False
     changes = []

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,9 +21,9 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
+from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course
 from xosc_lateral.world.road.network import RoadNetwork
 
-RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
 KEPT_ROWS = "kept"
 
 
@@ -31,18 +32,15 @@ class CutSettings:
     """How tracks are cut."""
 
     max_gap: float = 1.0  # longest stretch of rows that the provider made up (between two cameras) that is kept [s]
-    calm_rate: float = 0.1  # a lane change reaches back and forth to where the lateral speed falls below this [m/s]
-    longest_change: float = 8.0  # but not farther than this from the crossing [s]
+    longest_change: float = MAXIMUM_HALF_DURATION  # a lane change is not sought farther from its crossing than this [s]
     margin: float = 1.0  # cut in addition before and after each lane change [s]
     # edge: cut at both ends of what is left: vehicles still settle there, or are about to set off, and trackers
     # have less to go by [s]
     edge: float = 2.0
     shortest: float = 5.0  # stretches below this are dropped [s]
-    # open_offset, open_rate: a track that begins or ends farther from the lane centre than this, or faster
-    # sideways, is taken to do so in a lane change whose rest was not seen; and nobody has settled in a lane who
-    # is farther from its centre: a car of 1.8 m touches a marking at 0.95 m [m], [m/s]
-    open_offset: float = 0.7
-    open_rate: float = 0.3
+    # open_offset: a track that begins or ends farther from the lane centre than this, moving sideways, is taken to do
+    # so in a lane change whose rest was not seen [m]
+    open_offset: float = SETTLED_OFFSET
 
 
 DEFAULT_CUTS = CutSettings()
@@ -57,24 +55,16 @@ def lane_changes(
     where unknown; rows sorted by vehicle and time, `step` apart. [s]
     """
     changing = np.zeros(len(x), dtype=np.bool_)
-    reach, margin = round(settings.longest_change / step), round(settings.margin / step)
-    first = np.searchsorted(vehicle, vehicle, side="left")
-    last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    rate = _lateral_speed(x, first, last, step)
-    near = np.abs(offset) < settings.open_offset
-    switches = np.flatnonzero((vehicle[1:] == vehicle[:-1]) & (lane[1:] != lane[:-1]))
-    new = np.flatnonzero(vehicle[1:] != vehicle[:-1])
-    ends = np.concatenate([[0], new, new + 1, [len(vehicle) - 1]]).astype(np.int64)
-    fast = np.abs(rate[ends])  # tracks may be cut off amid a lane change
-    is_open = (np.abs(offset[ends]) > settings.open_offset) & (fast > settings.calm_rate) | (fast > settings.open_rate)
-    for k in np.concatenate([switches, ends[is_open]]):
-        lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
-        towards = np.sign(rate[k]) or 1.0
-        before = np.flatnonzero(near[lowest : k + 1] & (towards * rate[lowest : k + 1] < settings.calm_rate))
-        after = np.flatnonzero(near[k : highest + 1] & (towards * rate[k : highest + 1] < settings.calm_rate))
-        begin = lowest + before[-1] if len(before) else lowest
-        end = k + after[0] if len(after) else highest
-        changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
+    side = np.full(len(x), settings.open_offset)
+    edges = np.flatnonzero(np.diff(vehicle, prepend=vehicle[:1] - 1, append=vehicle[-1:] + 1))
+    for rows in (slice(*edge) for edge in pairwise(edges.tolist())):
+        y, base = x[rows], x[rows] - offset[rows]
+        known = np.flatnonzero(np.isfinite(base))
+        if len(known) > 1:  # where it is in no lane, those before and after count
+            time = step * np.arange(len(y), dtype=np.float64)
+            base, y = (np.interp(time, time[known], values[known]) for values in (base, y))
+            course = Course.across(time, y, base, lane[rows], side[rows], longest=settings.longest_change)
+            changing[rows] = course.changing(settings.margin)
     return changing
 
 
@@ -150,15 +140,6 @@ def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time:
     kept = state == KEPT_ROWS
     other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
     return _runs(other | (np.diff(time) > MAX_GAP + 1e-9))
-
-
-def _lateral_speed(x: FloatArray, first: IntArray, last: IntArray, step: float) -> FloatArray:
-    """Difference over `RATE_WINDOW`, one-sided at a track's ends; 0 where unknown. [m/s]"""
-    half = max(1, round(0.5 * RATE_WINDOW / step))
-    rows = np.arange(len(x))
-    ahead, behind = np.minimum(rows + half, last), np.maximum(rows - half, first)
-    rate = (x[ahead] - x[behind]) / (np.maximum(ahead - behind, 1) * step)
-    return np.where(np.isfinite(rate), rate, 0.0)
 
 
 def _runs(new: BoolArray) -> IntArray:

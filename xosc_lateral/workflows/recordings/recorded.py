@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.lane_changes import lane_levels
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.positions import Poses
 
@@ -66,16 +67,6 @@ class Recording:
     left_out: tuple[str, ...]
     start: float  # start, end: of the window [s]
     end: float
-
-
-def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left; shape (n,).
-
-    A step of the offset by more than half a lane is a new lane; one lane that goes over into another ahead has none.
-    """
-    step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
-    lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
-    return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
