@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from laboratory.markers import show
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.conversion.plan import choose_drivers
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
@@ -43,7 +43,7 @@ def main() -> None:
         drivers = choose_drivers(played.scenario, ConvertSettings(profile=profile))
         contacts, departures, gaps = 0, 0, []
         for seed in range(args.count):
-            made = enrich(played.motion, played.network, drivers, seed=seed)
+            made = enrich(SegmentedRun(played.motion, played.network), drivers, seed=seed)
             contacts += bool(made.new_contacts)
             departures += bool(made.departures)
             gaps.append(min(gap.distance for gap in made.gaps_after))

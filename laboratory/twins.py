@@ -26,7 +26,7 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.recordings.page import recorded_path
@@ -59,7 +59,7 @@ def twins_of(source: Path, begin: float, variants: int) -> Twins:
     chosen = {plan.name: one.profile for plan, one in zip(made.plans, made.drivers, strict=True) if one.profile}
     profiles = {name: read_profile(name) for name in set(chosen.values())}
     drivers = {name: profiles[profile] for name, profile in chosen.items()}
-    made_up = [enrich(played.motion, played.network, drivers, seed=1, variant=k) for k in range(variants)]
+    made_up = [enrich(SegmentedRun(played.motion, played.network), drivers, seed=1, variant=k) for k in range(variants)]
     return Twins(made, played, made_up)
 
 

@@ -14,7 +14,7 @@ from xosc_lateral.drivers.fitting.context_effects import FADING_DISTANCE, measur
 from xosc_lateral.drivers.fitting.fitting import fit_population
 from xosc_lateral.drivers.model.effects import Acts, Proximity
 from xosc_lateral.drivers.model.profile import Basis, Beside
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 
 BESIDE = response_to("right_distance")
@@ -94,8 +94,8 @@ def test_the_law_moves_only_whose_answer_is_unknown(
     }
     shifts = []
     for seed in range(8):
-        found = enrich(together(*cars), network, drivers, seed=seed, neighbours=neighbours)
-        alone = enrich(together(*cars), network, drivers, seed=seed, neighbours=Neighbours.PROFILE)
+        found = enrich(SegmentedRun(together(*cars), network, neighbours=neighbours), drivers, seed=seed)
+        alone = enrich(SegmentedRun(together(*cars), network, neighbours=Neighbours.PROFILE), drivers, seed=seed)
         np.testing.assert_array_equal(found.entity("slow").deviation, alone.entity("slow").deviation)
         shifts.append(np.abs(found.entity("fast").deviation - alone.entity("fast").deviation).max())
     assert (max(shifts) > 0.05) == moves
@@ -119,7 +119,9 @@ def test_with_no_neighbours_not_even_a_profile_s_own_effect_answers(tmp_path: Pa
     answer = {}
     for which in (Neighbours.NONE, Neighbours.PROFILE):
         moved, still = (
-            enrich(together(*cars), network, {"fast": one}, seed=1, neighbours=which).entity("fast").deviation
+            enrich(SegmentedRun(together(*cars), network, neighbours=which), {"fast": one}, seed=1)
+            .entity("fast")
+            .deviation
             for one in (shy, base)
         )
         answer[which] = np.abs(moved - still).max()

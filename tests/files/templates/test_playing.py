@@ -7,7 +7,7 @@ import pytest
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.files.templates import TEMPLATES, find_template
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.playing.call import scenario_segments
 from xosc_lateral.world.motion.nominal import Activity
@@ -40,7 +40,7 @@ def test_it_plays_as_written_to_its_end_without_a_collision_and_with_road_to_fol
     found = played(name, traffic=side)
     assert found.motion.ended_by == "stop trigger"
     assert found.motion.notes == ()
-    gaps = enrich(found.motion, found.network, {}, seed=0).gaps_before
+    gaps = enrich(SegmentedRun(found.motion, found.network), {}, seed=0).gaps_before
     assert min(gap.distance for gap in gaps) > 1.0
     for entity in found.motion.entities:
         assert not np.any(entity.activity & (Activity.ROAD_END | Activity.OFF_ROAD))
@@ -68,7 +68,9 @@ def test_speeds_are_those_that_were_set(played):
 
 def test_the_ego_vehicle_stops_behind_the_jam_with_the_gap_that_was_set(played):
     found = played("jam-end", jam_gap="12")
-    gaps = {gap.names: gap.distance for gap in enrich(found.motion, found.network, {}, seed=0).gaps_before}
+    gaps = {
+        gap.names: gap.distance for gap in enrich(SegmentedRun(found.motion, found.network), {}, seed=0).gaps_before
+    }
     assert gaps[("Ego", "Jam00")] == pytest.approx(12.0, abs=2 * 31.0 * found.motion.step)  # braking begins on a step
 
 
@@ -81,7 +83,9 @@ def test_a_jam_that_nobody_could_stop_before_is_refused(distance, played_out, pl
             played("jam-end", **settings)
         return
     found = played("jam-end", **settings)
-    gaps = {gap.names: gap.distance for gap in enrich(found.motion, found.network, {}, seed=0).gaps_before}
+    gaps = {
+        gap.names: gap.distance for gap in enrich(SegmentedRun(found.motion, found.network), {}, seed=0).gaps_before
+    }
     assert gaps[("Ego", "Jam00")] == pytest.approx(8.0, abs=2 * 45.0 * found.motion.step)
 
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from tests.kit.motion import RADIUS, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.model.effects import Acts, Effect, Factor, Form, Linear, Product
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
@@ -29,8 +29,10 @@ def _effect_alone(motion: NominalMotion, network: RoadNetwork, effect: Effect) -
     """Time and what the effect adds to the first vehicle's offset: the same seed with and without it."""
     base = simulated_profile()
     name = motion.entities[0].name
-    without = enrich(motion, network, {name: base}, seed=4, neighbours=PROFILE).entity(name)
-    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, neighbours=PROFILE).entity(name)
+    without = enrich(SegmentedRun(motion, network, neighbours=PROFILE), {name: base}, seed=4).entity(name)
+    with_it = enrich(
+        SegmentedRun(motion, network, neighbours=PROFILE), {name: replace(base, effects=(effect,))}, seed=4
+    ).entity(name)
     assert not with_it.neutral
     (plain,), (changed,) = without.segments, with_it.segments
     return changed.time, changed.offset - plain.offset

@@ -15,7 +15,7 @@ from tests.kit.motion import drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.motion.trajectory import distance_driven
@@ -53,7 +53,7 @@ def test_the_path_deviates_by_the_sampled_offsets_to_a_centimetre_in_lane_coordi
     network = two_roads(tmp_path)
     motion = together(drive(network, entity(), start=300.0), drive(network, entity("back"), lane=2, start=300.0))
     profile = simulated_profile()
-    result = enrich(motion, network, {"car": profile, "back": profile}, seed=3)
+    result = enrich(SegmentedRun(motion, network), {"car": profile, "back": profile}, seed=3)
     for item in result.entities:
         path, nominal = item.trajectory, item.motion
         found = network.path_to_lane(path.x, path.y, nominal.road, nominal.s)
@@ -73,7 +73,7 @@ def test_whoever_follows_a_trajectory_moves_in_a_lane_change_as_if_there_were_no
         activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
         activity[rows] |= int(Activity.LATERAL)
         motion = together(drive(network, entity(), duration=20.0, activity=activity))
-        result = enrich(motion, network, {"car": simulated_profile()}, seed=1, continuous=["car"])
+        result = enrich(SegmentedRun(motion, network, continuous=["car"]), {"car": simulated_profile()}, seed=1)
         (item,) = result.entities
         deviations.append(item.deviation)
         following = [segment.span for segment in item.segments]
@@ -98,7 +98,9 @@ def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what
         activity[500] |= int(Activity.TELEPORTED)
     motion = replace(motion, activity=activity)
     found = [
-        enrich(together(motion), network, {"car": simulated_profile()}, seed=1, continuous=names).entities[0].deviation
+        enrich(SegmentedRun(together(motion), network, continuous=names), {"car": simulated_profile()}, seed=1)
+        .entities[0]
+        .deviation
         for names in ((), ("car",))
     ]
     if what == "slow":
@@ -112,7 +114,7 @@ def test_a_lane_change_leads_over_smoothly_and_no_offset_is_sampled_in_it(tmp_pa
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
     activity[400:600] |= int(Activity.LATERAL)
     motion = together(drive(network, entity(), duration=20.0, activity=activity))
-    (item,) = enrich(motion, network, {"car": simulated_profile()}, seed=1).entities
+    (item,) = enrich(SegmentedRun(motion, network), {"car": simulated_profile()}, seed=1).entities
     first, second = item.segments
     assert first.time[-1] <= 400 * motion.step
     assert second.time[0] >= 600 * motion.step
@@ -127,7 +129,7 @@ def test_a_standing_car_does_not_slide(tmp_path: Path) -> None:
     time = np.arange(1001) * 0.02
     speed = np.clip(30.0 - 5.0 * (time - 5.0), 0.0, 30.0)
     motion = together(drive(network, entity(), duration=20.0, speed=speed))
-    (item,) = enrich(motion, network, {"car": simulated_profile()}, seed=1).entities
+    (item,) = enrich(SegmentedRun(motion, network), {"car": simulated_profile()}, seed=1).entities
     standing = speed == 0.0
     assert np.ptp(item.trajectory.x[standing]) == 0.0
     assert np.ptp(item.deviation[standing]) == 0.0
@@ -137,12 +139,12 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     profile = simulated_profile()
     a, b = drive(network, entity("a")), drive(network, entity("b"), lane=-1)
-    alone = enrich(together(a), network, {"a": profile}, seed=5)
-    both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, neighbours=PROFILE)
+    alone = enrich(SegmentedRun(together(a), network), {"a": profile}, seed=5)
+    both = enrich(SegmentedRun(together(b, a), network, neighbours=PROFILE), {"a": profile, "b": profile}, seed=5)
     np.testing.assert_array_equal(alone.entity("a").deviation, both.entity("a").deviation)
     assert not np.array_equal(both.entity("a").deviation, both.entity("b").deviation)
     for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "seed_words": {"a": [1]}}):
-        changed = enrich(together(a), network, {"a": profile}, **other)  # type: ignore[arg-type]
+        changed = enrich(SegmentedRun(together(a), network), {"a": profile}, **other)  # type: ignore[arg-type]
         assert not np.array_equal(alone.entity("a").deviation, changed.entity("a").deviation)
 
 
@@ -153,8 +155,8 @@ def test_an_effect_sees_the_context_around_its_segment_and_acts_in_it(tmp_path: 
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
     activity[300:400] |= int(Activity.LATERAL)
     motion = together(drive(network, entity(), start=200.0, duration=20.0, activity=activity))
-    plain = enrich(motion, network, {"car": base}, seed=1).entity("car")
-    shifted = enrich(motion, network, {"car": _with(base, effect)}, seed=1).entity("car")
+    plain = enrich(SegmentedRun(motion, network), {"car": base}, seed=1).entity("car")
+    shifted = enrich(SegmentedRun(motion, network), {"car": _with(base, effect)}, seed=1).entity("car")
     for with_effect, without in zip(shifted.segments, plain.segments, strict=True):
         # looked ahead by a second, beyond the segment too; the curve begins at once, and is seen over a second or two
         since = with_effect.time + 1.0 - 10.0
@@ -168,11 +170,11 @@ def test_a_context_that_nobody_supplies_is_named_and_a_given_one_is_used(tmp_pat
     network = two_roads(tmp_path)
     driver = _with(simulated_profile(), Shift(column="wind_speed"))
     motion = together(drive(network, entity()))
-    unknown = enrich(motion, network, {"car": driver}, seed=1)
+    unknown = enrich(SegmentedRun(motion, network), {"car": driver}, seed=1)
     assert unknown.entity("car").neutral == ("wind_speed",)
     assert any("wind_speed" in warning for warning in unknown.warnings())
     wind = (np.array([0.0, 10.0]), np.array([0.2, 0.2]))
-    given = enrich(motion, network, {"car": driver}, seed=1, context={"wind_speed": wind})
+    given = enrich(SegmentedRun(motion, network), {"car": driver}, seed=1, context={"wind_speed": wind})
     difference = given.entity("car").segments[0].offset - unknown.entity("car").segments[0].offset
     np.testing.assert_allclose(difference, 0.2)
     assert not given.warnings()
@@ -183,15 +185,19 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     motion = together(drive(network, entity("a"), lane=-2), drive(network, entity("b"), lane=-1))
     far_left = (np.array([0.0, 10.0]), np.array([2.2, 2.2]))
     driver = _with(simulated_profile(), Shift(column="push"))
-    result = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, neighbours=PROFILE)
+    result = enrich(
+        SegmentedRun(motion, network, neighbours=PROFILE), {"a": driver}, seed=1, context={"push": far_left}
+    )
     assert [departure.name for departure in result.departures] == ["a"]
     assert [gap.names for gap in result.new_contacts] == [("a", "b")]
     assert len(result.warnings()) == 2
-    again = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, attempts=3, neighbours=PROFILE)
+    again = enrich(
+        SegmentedRun(motion, network, neighbours=PROFILE), {"a": driver}, seed=1, context={"push": far_left}, attempts=3
+    )
     assert len(again.departures) == 1  # nothing helps against a driver who is pushed over the marking
-    jointly = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left})
+    jointly = enrich(SegmentedRun(motion, network), {"a": driver}, seed=1, context={"push": far_left})
     assert not jointly.new_contacts, "a car that is there is given way to"
-    calm = enrich(motion, network, {"a": simulated_profile()}, seed=1, attempts=3)
+    calm = enrich(SegmentedRun(motion, network), {"a": simulated_profile()}, seed=1, attempts=3)
     assert calm.attempt == 0
     assert not calm.warnings()
 
@@ -200,7 +206,7 @@ def test_a_nominal_jump_is_told_with_time_and_length(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     whole = drive(network, entity())
     motion = together(replace(whole, y=whole.y + np.where(whole.time < 3.99, 0.0, 1.9)))
-    (warning,) = enrich(motion, network, {}, seed=1).warnings()
+    (warning,) = enrich(SegmentedRun(motion, network), {}, seed=1).warnings()
     assert warning.startswith("car jumps 2.0 m at 4.0 s, as in the nominal motion: ")
 
 
@@ -208,8 +214,7 @@ def test_who_is_not_enriched_keeps_every_bit_and_the_reason_is_given(tmp_path: P
     network = two_roads(tmp_path)
     slow = drive(network, entity("slow"), speed=8.0)
     result = enrich(
-        together(slow, drive(network, entity("other"))),
-        network,
+        SegmentedRun(together(slow, drive(network, entity("other"))), network),
         {"slow": simulated_profile(), "other": "why not"},
         seed=1,
     )
@@ -223,7 +228,9 @@ def test_a_trailer_follows_in_its_tractors_track(tmp_path: Path) -> None:
     tractor = drive(network, entity("tractor"), start=60.0)
     trailer = drive(network, entity("trailer"), start=50.0)
     result = enrich(
-        together(tractor, trailer), network, {"tractor": simulated_profile()}, seed=2, trailers={"trailer": "tractor"}
+        SegmentedRun(together(tractor, trailer), network, trailers={"trailer": "tractor"}),
+        {"tractor": simulated_profile()},
+        seed=2,
     )
     delay = np.interp(distance_driven(tractor) - 10.0, distance_driven(tractor), result.entity("tractor").deviation)
     np.testing.assert_allclose(result.entity("trailer").deviation, delay, atol=1e-9)
@@ -237,9 +244,13 @@ def test_a_positive_offset_is_to_the_left_of_travel_in_both_traffic_rules(tmp_pa
     for lane in (-2, 2):
         motion = together(drive(network, entity(), lane=lane, start=100.0))
         home = structs.replace(simulated_profile(), left_hand=rule == "LHT")
-        base = enrich(motion, network, {"car": home}, seed=1).entity("car").trajectory
+        base = enrich(SegmentedRun(motion, network), {"car": home}, seed=1).entity("car").trajectory
         driver = _with(home, Shift(column="push"))
-        pushed = enrich(motion, network, {"car": driver}, seed=1, context={"push": push}).entity("car").trajectory
+        pushed = (
+            enrich(SegmentedRun(motion, network), {"car": driver}, seed=1, context={"push": push})
+            .entity("car")
+            .trajectory
+        )
         heading = motion.entities[0].heading
         left = -np.sin(heading) * (pushed.x - base.x) + np.cos(heading) * (pushed.y - base.y)
         np.testing.assert_allclose(left, 1.0, atol=1e-6)

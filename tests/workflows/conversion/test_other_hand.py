@@ -13,7 +13,7 @@ from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.seen import mirrored
 from xosc_lateral.world.scenario.enums import VehicleCategory
 
@@ -30,7 +30,7 @@ def deviations(
     who = {2: entity("truck", VehicleCategory.TRUCK, 12.0), 1: entity("car")}
     motions = [drive(network, who[lane], lane=side * lane, start=start) for lane in lanes]
     drivers = {one.name: driver for one in motions}
-    found = enrich(together(*motions), network, drivers, seed=seed)
+    found = enrich(SegmentedRun(together(*motions), network), drivers, seed=seed)
     return {one.name: one.deviation for one in found.entities}
 
 

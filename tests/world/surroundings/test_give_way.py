@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.world.surroundings.give_way import (
     GAP_QUANTILES,
     OVERTAKING_SHARE,
@@ -105,8 +105,8 @@ def test_a_scenario_s_neighbours_keep_apart_whatever_their_order(tmp_path: Path)
     drivers = dict.fromkeys(names, simulated_profile())
     worst = []
     for seed in range(6):
-        found = enrich(together(*cars.values()), network, drivers, seed=seed)
-        again = enrich(together(*reversed(cars.values())), network, drivers, seed=seed)
+        found = enrich(SegmentedRun(together(*cars.values()), network), drivers, seed=seed)
+        again = enrich(SegmentedRun(together(*reversed(cars.values())), network), drivers, seed=seed)
         for one in found.entities:
             np.testing.assert_array_equal(one.deviation, again.entity(one.name).deviation)
         worst.append(min(gap.distance for gap in found.gaps_after))

@@ -20,9 +20,9 @@ from xosc_lateral.files.source import guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.load import load_scenario, play_loaded
-from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning, meaning_of
+from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
+from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
@@ -108,42 +108,41 @@ def convert_scenario(
     written; nothing is left half-written.
     """
     with guarding_inputs(), spilling_to(output.parent if saves else None):
-        loaded = load_scenario(
-            source,
-            parameters=settings.parameters,
-            allowed=settings.allow,
-            roads=settings.roads,
-            strict=settings.strict,
-        )
-        played = play_loaded(loaded, settings.step, settings.time_limit)
-        plan = decide(loaded, played, settings, output=output, variant_index=variant_index, report=report, saves=saves)
-        sampled = sample(plan)
-        written = write(plan, sampled)
-        checked = check(plan, written)
-        if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
-            write_atomically(plan.output, checked.file.data)
-        return _conversion(plan, checked)
+        prepared = prepare(source, settings)
+        plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
+        return carry_out(plan)
+
+
+def carry_out(plan: Plan) -> Conversion:
+    """Sample, write, check."""
+    sampled = sample(plan)
+    written = write(plan, sampled)
+    checked = check(plan, written)
+    if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
+        write_atomically(plan.output, checked.file.data)
+    return _conversion(plan, checked)
 
 
 def sample(plan: Plan) -> Enriched:
     """Offsets of every vehicle that has a driver, for as long as the output may run."""
     settings, played = plan.settings, plan.played
     try:
+        run = plan.prepared.segmented(
+            plan.extended,  # played on beyond the end where the output is reactive, and the same up to there
+            uncertain=plan.depends.entities,
+            continuous=plan.continuous,
+            neighbours=settings.neighbours,
+            heeds_controllers=heeds_controllers(settings),
+        )
         return enrich(
-            plan.extended.motion,  # played on beyond the end where the output is reactive, and the same up to there
-            played.network,
+            run,
             plan.drivers,
             seed=settings.seed,
             variant=plan.variant_index,
             seed_words=seed_words_of(played.motion, played.network),
             context=plan.context,
-            trailers=played.trailers,
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
-            neighbours=settings.neighbours,
-            uncertain=plan.depends.entities,
-            heeds_controllers=heeds_controllers(settings),
-            continuous=plan.continuous,
             lane_changes=settings.lane_changes,
             least_time=0.0 if plan.is_replay else SUPPLY_TIME,
         )
@@ -152,14 +151,14 @@ def sample(plan: Plan) -> Enriched:
 
 
 def check(plan: Plan, written: Written) -> Written:
-    """Play a reactive output under `meaning_of`'s ways of driving, and make moves smaller where they change events.
+    """Play a reactive output under `Meaning`'s ways of driving, and make moves smaller where they change events.
 
     A replay follows the clock: nothing can happen otherwise.
     """
     if plan.is_replay:
         return written
     settings, source = plan.settings, plan.played.scenario
-    source_meaning = meaning_of(plan.played, tuple(plan.egos), step=settings.step, time_limit=settings.time_limit)
+    source_meaning = plan.prepared.meaning(tuple(plan.egos))
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 

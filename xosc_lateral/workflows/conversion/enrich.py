@@ -6,7 +6,6 @@ import hashlib
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -48,25 +47,20 @@ from xosc_lateral.world.motion.trajectory import (
     distance_driven,
 )
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.context import Surroundings
 from xosc_lateral.world.surroundings.give_way import SampledVehicle, give_way
 
 
 def enrich(
-    motion: NominalMotion,
-    network: RoadNetwork,
+    run: SegmentedRun,
     drivers: Drivers,
     *,
     seed: int,
     variant: int = 0,
     seed_words: Mapping[str, Sequence[int]] | None = None,
     context: Contexts | None = None,
-    trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
-    neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
-    uncertain: Collection[str] = (),
-    heeds_controllers: bool = True,
-    continuous: Collection[str] = (),
     lane_changes: LaneChanges = LaneChanges.WRITTEN,
     least_time: float = 0.0,
 ) -> Enriched:
@@ -75,47 +69,38 @@ def enrich(
     - `drivers`: per entity a profile, or the reason why it is not enriched
     - `seed`, `variant`, `seed_words`: with an entity's name they seed its own random numbers: another one changes none
     - `context`: what the scenario doesn't state, or replaces: times [s] and values, the same for all entities
-    - `trailers`: entity that is pulled -> its tractor, in whose track it follows
     - `attempts`: at most, while vehicles touch or leave their lane that nominally don't; the best is kept
-    - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
     - `with_sensor`: add what the sensor added to the drives that each profile was fitted on: nobody drives that, so it
       comes after drivers have given way and after what nobody could drive was smoothed
-    - `uncertain`: entities that will move otherwise, since they depend on a vehicle under test or a controller: nobody
-      responds to where they nominally are, nor do they to others
-    - `heeds_controllers`: where a controller of the player steers, nothing is sampled
-    - `continuous`: whose movement goes on through lane changes and lane offsets (`movement_runs`), across as
-      `lane_changes` says; that of the others leads from the segment before to the one behind
+    - `lane_changes`: how those of the run's `continuous` vehicles lead across
     - `least_time`: for which each segment is sampled, should it last longer in another run [s]
 
     Raises `DriverProfileError`: the sensor is asked for and a profile knows of none.
     """
-    trailers, words = trailers or {}, seed_words or {}
-    scene = (_kept_scene if _is_small(motion) else _Scene)(
-        motion, network, frozenset(trailers), frozenset(uncertain), frozenset(continuous), neighbours, heeds_controllers
-    )
+    motion, network, words = run.motion, run.network, seed_words or {}
     least_rows = round(least_time / SAMPLE_STEP)
 
     def drawn_for(index: int, attempt: int) -> _Drawn:
         entity = motion.entities[index]
-        driver, spans = drivers.get(entity.name, "not chosen"), scene.spans[index]
+        driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
         if isinstance(driver, str):
             return _Drawn(entity, spans, why=driver)
         seeds = np.random.SeedSequence(
             [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
         )
-        seen, lifelike = scene.seen(index, driver, context or {}), lane_changes is LaneChanges.LIFELIKE
-        blank = _Drawn(entity, spans, driver, seen, scene.crossings[index], lifelike)
+        seen, lifelike = run.seen(index, driver, context or {}), lane_changes is LaneChanges.LIFELIKE
+        blank = _Drawn(entity, spans, driver, seen, run.crossings[index], lifelike)
         return _draw(blank, driver, seeds, with_sensor, least_rows)
 
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
         drawn = [drawn_for(index, attempt) for index in range(len(motion.entities))]
-        if neighbours is Neighbours.BORROW:
-            drawn = _apart(drawn, motion, network, uncertain)
-        entities = _with_trailers([_result(one, network) for one in drawn], network, trailers)
+        if run.neighbours is Neighbours.BORROW:
+            drawn = _apart(drawn, motion, network, run.uncertain)
+        entities = _with_trailers([_result(one, network) for one in drawn], network, run.trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
         departures = tuple(departure for entity in entities for departure in lane_departures(entity, network))
-        result = Enriched(motion, network, entities, scene.gaps, gaps_after, departures, seed, variant, attempt)
+        result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
         if best is None or result.trouble < best.trouble:
             best = result
         if not result.trouble:
@@ -189,22 +174,33 @@ KEPT_ROWS = 100_000
 for two minutes then keeps about 10 MB. [-]"""
 
 
-class _Scene:
-    """What all variants of a run have in common; for the arguments see `enrich`, `pulled` are its trailers."""
+class SegmentedRun:
+    """A played scenario cut into segments, and what its drivers see: the same for all variants.
+
+    - `trailers`: entity that is pulled -> its tractor, in whose track it follows
+    - `uncertain`: entities that will move otherwise, since they depend on a vehicle under test or a controller: nobody
+      responds to where they nominally are, nor do they to others
+    - `continuous`: whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the others
+      leads from the segment before to the one behind
+    - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
+    - `heeds_controllers`: where a controller of the player steers, nothing is sampled
+    """
 
     def __init__(
         self,
         motion: NominalMotion,
         network: RoadNetwork,
-        pulled: frozenset[str],
-        uncertain: frozenset[str],
-        continuous: frozenset[str],
-        neighbours: Neighbours,
-        heeds_controllers: bool,
+        *,
+        trailers: Mapping[str, str] | None = None,
+        uncertain: Collection[str] = (),
+        continuous: Collection[str] = (),
+        neighbours: Neighbours = Neighbours.BORROW,
+        heeds_controllers: bool = True,
     ) -> None:
-        self._network, self._neighbours, self._uncertain = network, neighbours, uncertain
+        self.motion, self.network, self.neighbours = motion, network, neighbours
+        self.trailers, self.uncertain = trailers or {}, frozenset(uncertain)
         self.spans = [
-            cut_segments(entity, network, is_trailer=entity.name in pulled, heeds_controllers=heeds_controllers)
+            cut_segments(entity, network, is_trailer=entity.name in self.trailers, heeds_controllers=heeds_controllers)
             for entity in motion.entities
         ]
         self.runs = [
@@ -219,27 +215,26 @@ class _Scene:
         ]
         """Lane changes and lane offsets in them."""
         self.gaps = gaps_of(motion, [nominal_path(entity) for entity in motion.entities])
-        self._motion = motion
-        self._certain = replace(motion, entities=tuple(one for one in motion.entities if one.name not in uncertain))
+        certain = tuple(one for one in motion.entities if one.name not in self.uncertain)
+        self._certain = Surroundings(replace(motion, entities=certain), network)
         self._seen: dict[int, tuple[DriverProfile, Seen]] = {}
 
     def seen(self, index: int, driver: DriverProfile, contexts: Contexts) -> Seen:
         """What the driver of an entity sees; looked at once for all variants with the same one."""
         before, seen = self._seen.get(index, (None, NOTHING_SEEN))
         if before is not driver or contexts:
-            entity = self._motion.entities[index]
-            among = replace(self._motion, entities=(entity,)) if entity.name in self._uncertain else self._certain
-            seen = seen_by(driver, entity, among, self._network, self.runs[index], contexts, self._neighbours)
-            if not contexts and _is_small(self._motion):
+            entity, around = self.motion.entities[index], self._certain
+            if entity.name in self.uncertain:
+                around = Surroundings(replace(self.motion, entities=(entity,)), self.network)
+            seen = seen_by(driver, entity, around, self.runs[index], contexts, self.neighbours)
+            if not contexts and self.is_small:
                 self._seen[index] = driver, seen
         return seen
 
-
-def _is_small(motion: NominalMotion) -> bool:
-    return sum(len(entity.time) for entity in motion.entities) <= KEPT_ROWS
-
-
-_kept_scene = lru_cache(maxsize=2)(_Scene)  # variants of one run come one after another
+    @property
+    def is_small(self) -> bool:
+        """Whether it is worth its memory to keep it for the next variant."""
+        return sum(len(entity.time) for entity in self.motion.entities) <= KEPT_ROWS
 
 
 def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, with_sensor: bool, least: int) -> _Drawn:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -31,14 +31,13 @@ class Played:
         return {entity.trailer: entity.name for entity in self.scenario.entities if entity.trailer is not None}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class Loaded:
-    """A scenario and its road; equal where the bytes of all files and the parameters are."""
+    """A scenario and its road."""
 
-    files: tuple[tuple[Path, str], ...]  # every file that was parsed and the SHA-256 of its bytes
-    parameters: tuple[tuple[str, str], ...]
-    scenario: Scenario = field(compare=False)
-    network: RoadNetwork = field(compare=False)
+    files: Mapping[Path, str]  # every file that was parsed and the SHA-256 of its bytes
+    scenario: Scenario
+    network: RoadNetwork
 
 
 def play_scenario(
@@ -64,44 +63,22 @@ def load_scenario(
     roads: RoadSearch = NO_ROADS,
     strict: bool = False,
 ) -> Loaded:
-    """Read a scenario and its road; once for all its variants if it depends on its file and its road's place alone.
+    """Read a scenario and its road.
 
     `parameters` replace those declared; its road and catalogs may lie in `allowed` folders besides those around it, its
     road also where `roads` says; `strict`: a missing vehicle catalog is refused, instead of played as a usual car.
 
     Raises `FormatError`: with file, line and element.
     """
-    values = tuple(sorted((parameters or {}).items()))
-    state = check_regular(path)
-    guard_input(path)
-    folders = tuple(allowed)
-    reads = _read_once.cache_info().misses
-    scenario = _read_once(path, values, folders, roads, strict, state_key(state))
-    is_fresh = _read_once.cache_info().misses > reads
-    stands_alone = not scenario.catalog_locations and not scenario.remarks
-    if not is_fresh and not (stands_alone and (scenario.road_file is None or scenario.road_file.is_file())):
-        # A result that was kept holds only where nothing else was read, or missed.
-        scenario = read_scenario(path, dict(values), allowed=folders, roads=roads, strict=strict)
-    network, road = RoadNetwork(()), tuple[tuple[Path, str], ...]()
-    if scenario.road_file is not None:
-        network = road_network(scenario.road_file)
-        road = ((scenario.road_file, network.sha256),)
-    return Loaded((*scenario.input_hashes.items(), *road), values, scenario, network)
+    scenario = read_scenario(
+        path, dict(sorted((parameters or {}).items())), allowed=tuple(allowed), roads=roads, strict=strict
+    )
+    if scenario.road_file is None:
+        return Loaded(scenario.input_hashes, scenario, RoadNetwork(()))
+    network = road_network(scenario.road_file)
+    return Loaded({**scenario.input_hashes, scenario.road_file: network.sha256}, scenario, network)
 
 
-@lru_cache(maxsize=2)
-def _read_once(
-    path: Path,
-    parameters: tuple[tuple[str, str], ...],
-    allowed: tuple[Path, ...],
-    roads: RoadSearch,
-    strict: bool,
-    _state: tuple[int, ...],
-) -> Scenario:
-    return read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
-
-
-@lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work
 def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played:
     """Play nominally; raises `PlaybackError`."""
     motion = play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import inf
 from typing import TypeVar
 
@@ -155,12 +154,6 @@ def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
     return replace(scenario, storyboard=structs.replace(storyboard, stop_trigger=trigger))
 
 
-@lru_cache(maxsize=1)  # the same for all variants
-def meaning_of(played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> Meaning:
-    """See `Meaning`."""
-    return Meaning(played, egos, step=step, time_limit=time_limit)
-
-
 def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str], speeds: Speeds) -> Scenario:
     """A scenario in which vehicles under test change their speed."""
     place = scenario.storyboard.place
@@ -282,7 +275,6 @@ def _blamed(
     return next(free, None)
 
 
-@lru_cache(maxsize=2)  # as `play_loaded`, whose result is the same object for all variants
 def play_until(played: Played, end: float, *, step: float) -> Played:
     """The same run, stopped at another time. [s]"""
     motion = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)

@@ -19,8 +19,8 @@ from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
 from xosc_lateral.files.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.files.tables import ContextTable, read_context
-from xosc_lateral.workflows.conversion.load import Loaded, Played
-from xosc_lateral.workflows.conversion.meaning import meaning_of, play_until
+from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.prepared import Prepared
 from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
 from xosc_lateral.world.motion.nominal import NominalMotion
@@ -48,7 +48,7 @@ class Plan:
     saves: bool
     version: Version  # of the standard that is written
     inputs: Mapping[Path, str]  # SHA-256 of every file that was read
-    played: Played  # the nominal run
+    prepared: Prepared
     extended: Played  # as long as others may need offsets where a vehicle under test is slower
     egos: Mapping[str, str]  # vehicles under test, and why each is one
     controllers: Mapping[str, Control]  # of entities that are left to them
@@ -60,6 +60,11 @@ class Plan:
     # unwritable: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
     unwritable: Mapping[str, str]
     lateral: LateralActions  # of the scenario: what is to stop lane offsets
+
+    @property
+    def played(self) -> Played:
+        """The nominal run."""
+        return self.prepared.played
 
     def written_as(self, enriched: frozenset[str]) -> WrittenAs:
         """How the vehicles that got offsets are written."""
@@ -92,8 +97,7 @@ class WrittenAs:
 
 
 def decide(
-    loaded: Loaded,
-    played: Played,
+    prepared: Prepared,
     settings: ConvertSettings,
     *,
     output: Path,
@@ -106,7 +110,8 @@ def decide(
     Raises `FormatError`: the settings do not go with the scenario, or an output would replace an input;
     `DriverProfileError`: a profile is not known.
     """
-    scenario, target = played.scenario, settings.target
+    played, target = prepared.played, settings.target
+    scenario = played.scenario
     _refuse_lane_offsets_for_carla(scenario, settings)
     egos = chosen_egos(scenario, settings)
     controllers = dict[str, Control]()  # none where everybody is replayed
@@ -114,7 +119,7 @@ def decide(
         controllers = {name: control for name, control in controlled_entities(scenario).items() if name not in egos}
     depends = dependence(scenario, (*egos, *controllers))
     context = None if settings.context is None else read_context(settings.context)
-    inputs = dict(loaded.files)
+    inputs = dict(prepared.loaded.files)
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
     refuse_outputs([output if saves else None, report], inputs)
@@ -129,8 +134,8 @@ def decide(
         saves,
         version,
         inputs,
-        played,
-        _extended_by_trials(played, settings, depends, tuple(egos)),
+        prepared,
+        _extended_by_trials(prepared, settings, depends, tuple(egos)),
         egos,
         controllers,
         depends,
@@ -190,17 +195,18 @@ def heeds_controllers(settings: ConvertSettings) -> bool:
 
 
 def _extended_by_trials(
-    played: Played, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]
+    prepared: Prepared, settings: ConvertSettings, depends: Dependence, egos: tuple[str, ...]
 ) -> Played:
     """The run that offsets are for: a longer one where a vehicle under test decides when trajectories end."""
+    played = prepared.played
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if settings.mode is not OutputMode.AUTO or _is_replay(settings, depends) or not ends:
         return played
-    runs = meaning_of(played, egos, step=settings.step, time_limit=settings.time_limit)
+    runs = prepared.meaning(egos)
     end = min(
         max(runs.end, LEAST_EXTENSION * played.motion.end_time), LARGEST_EXTENSION * played.motion.end_time, runs.limit
     )
-    return play_until(played, end, step=settings.step) if end > played.motion.end_time else played
+    return prepared.until(end) if end > played.motion.end_time else played
 
 
 def _unwritable(

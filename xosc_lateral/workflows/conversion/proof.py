@@ -13,11 +13,11 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.workflows.conversion.enrich import enrich
+from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import SAMPLE_STEP
-from xosc_lateral.world.surroundings.context import entity_context
+from xosc_lateral.world.surroundings.context import Surroundings
 
 Converted = Callable[[str, int], FloatArray]
 """Template, number of the vehicle -> deviations."""
@@ -89,7 +89,8 @@ def _contexts(name: str) -> tuple[tuple[IntArray, Mapping[str, FloatArray]], ...
     played = _played(name)
     every = round(SAMPLE_STEP / played.motion.step)
     grids = [np.arange(0, len(entity.time), every) for entity in played.motion.entities]
-    return tuple((grid, entity_context(played.motion, played.network, k, grid)) for k, grid in enumerate(grids))
+    surroundings = Surroundings(played.motion, played.network)
+    return tuple((grid, surroundings.context(k, grid)) for k, grid in enumerate(grids))
 
 
 def _stretches(name: str, effect: ColumnEffect) -> Iterator[tuple[int, IntArray, float]]:
@@ -107,5 +108,6 @@ def _deviations(profile: DriverProfile, name: str, vehicle: int) -> FloatArray:
     """How far from the nominal path one vehicle drives in conversions, shape (seeds, rows). [m]"""
     played = _played(name)
     drivers = {played.motion.entities[vehicle].name: profile}
-    conversions = [enrich(played.motion, played.network, drivers, seed=k, neighbours=Neighbours.PROFILE) for k in SEEDS]
+    run = SegmentedRun(played.motion, played.network, neighbours=Neighbours.PROFILE)
+    conversions = [enrich(run, drivers, seed=k) for k in SEEDS]
     return np.array([one.entities[vehicle].deviation for one in conversions])

@@ -21,10 +21,10 @@ from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProf
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT
 from xosc_lateral.drivers.model.sampling import Responses, responses_to
 from xosc_lateral.workflows.conversion.result import Neighbours
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.context import entity_context
+from xosc_lateral.world.surroundings.context import Surroundings
 
 SAMPLE_STEP = 0.2
 """Step of the driver model. [s]"""
@@ -70,13 +70,13 @@ NOTHING_SEEN = Seen()
 def seen_by(
     driver: DriverProfile,
     entity: EntityMotion,
-    motion: NominalMotion,
-    network: RoadNetwork,
+    surroundings: Surroundings,
     runs: Sequence[tuple[SegmentSpan, ...]],
     contexts: Contexts,
     neighbours: Neighbours,
 ) -> Seen:
-    """What the driver of an entity sees on runs of spans; in `motion` are those whose place beside him is certain."""
+    """What the driver of an entity sees on runs of spans; around are those whose place beside him is certain."""
+    motion, network = surroundings.motion, surroundings.network
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[SeenSegment] = []
@@ -88,7 +88,7 @@ def seen_by(
         for span in spans:
             if span.is_road_following:
                 _refuse_no_width(entity, span, network)
-        segment = _segment(motion, network, index, knots, every, contexts)
+        segment = _segment(surroundings, index, knots, every, contexts)
         if neighbours is Neighbours.NONE:
             beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
             emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
@@ -120,11 +120,9 @@ def _refuse_no_width(entity: EntityMotion, span: SegmentSpan, network: RoadNetwo
     )
 
 
-def _segment(
-    motion: NominalMotion, network: RoadNetwork, index: int, knots: IntArray, every: int, contexts: Contexts
-) -> Segment:
+def _segment(surroundings: Surroundings, index: int, knots: IntArray, every: int, contexts: Contexts) -> Segment:
     """The segment on its knots, with context before and after as far as the entity's motion is one piece."""
-    entity = motion.entities[index]
+    entity = surroundings.motion.entities[index]
     start = max(0, knots[0] - every * round(PAST_CONTEXT / SAMPLE_STEP))
     stop = min(len(entity.time), knots[-1] + every * round(FUTURE_CONTEXT / SAMPLE_STEP) + 1)
     earlier, later = (
@@ -134,7 +132,7 @@ def _segment(
     before = (knots[0] - start - int(earlier.max(initial=0))) // every
     after = int(later.min(initial=stop - knots[-1] - 1)) // every
     grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
-    context = entity_context(motion, network, index, grid)
+    context = surroundings.context(index, grid)
     for name, (time, values) in contexts.items():
         context[name] = np.interp(entity.time[grid], time, values)
     lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))

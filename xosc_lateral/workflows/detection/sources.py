@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -14,11 +13,13 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
 from xosc_lateral.files.mapping import TableMapping, as_mapping
+from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind
-from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.convert import carry_out
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
-from xosc_lateral.workflows.conversion.plan import chosen_egos
+from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
+from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
@@ -27,6 +28,7 @@ from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH,
 from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import ACROSS_LANE
+from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
 
 
@@ -101,15 +103,14 @@ def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, setti
 
     def scenes() -> Iterator[Scene]:
         for scenario, name in named:
-            source = _play(scenario, settings).scenario
-            around = [path.parent for path in (*source.input_files, source.road_file or scenario)]
+            prepared = prepare(scenario, convert)
             for variant in range(settings.variants):
-                with TemporaryDirectory() as folder:
-                    output = Path(folder) / scenario.name
-                    made = convert_scenario(scenario, output, convert, variant_index=variant)
-                    played = _play(output, replace(settings, convert=replace(convert, allow=(*convert.allow, *around))))
-                    ego = settings.ego or next(iter(made.provenance.ego), "none")
-                    yield played_scene(played, f"{name} #{variant + 1}", ego, cluster=name)
+                made = carry_out(decide(prepared, convert, output=scenario, variant_index=variant, saves=False))
+                written = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
+                motion = play(written, prepared.played.network, step=STEP, time_limit=convert.time_limit)
+                ego = settings.ego or next(iter(made.provenance.ego), "none")
+                played = Played(written, prepared.played.network, motion)
+                yield played_scene(played, f"{name} #{variant + 1}", ego, cluster=name)
 
     return Source(f"{label}, {profile}", scenes, tuple(scenario for scenario, _ in named))
 

@@ -151,10 +151,10 @@ class Playback(Result):
 
     def plot(self) -> Figure | None:
         """Paths across the road over along it; None when no entity is on a road."""
-        from xosc_lateral.workflows.conversion.enrich import enrich
+        from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
         from xosc_lateral.workflows.playing.figures import paths_stretched
 
-        return paths_stretched(enrich(self._played.motion, self._played.network, {}, seed=0))
+        return paths_stretched(enrich(SegmentedRun(self._played.motion, self._played.network), {}, seed=0))
 
     def csv(self) -> str:
         """The table as text."""

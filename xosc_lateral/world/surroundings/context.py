@@ -11,7 +11,7 @@ second or two.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,18 +35,47 @@ ROWS_TOGETHER = 100_000
 TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
 
 
-def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
-    """Context of the `index`-th vehicle of a motion on some of its rows, shape (n,) each.
+class Surroundings:
+    """What the vehicles of a motion see; what is the same for all of them is found once."""
 
-    NaN where there is none (no lane to that side; off the road), infinite where a lane has nobody within reach. Weather
-    that the scenario does not state is absent.
-    """
-    entity = motion.entities[index]
-    road = _road(entity, network, grid)
-    step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING_DURATION
-    beside = _neighbours(motion, network, index, grid, _lanes_there(road, step))
-    road = {name: _around(values, step) for name, values in road.items()}
-    return _own_motion(entity, grid) | road | beside | _weather(motion, entity, grid)
+    def __init__(self, motion: NominalMotion, network: RoadNetwork) -> None:
+        self.motion, self.network = motion, network
+        self._latest: tuple[tuple[int, int], _Traffic] | None = None
+
+    def context(self, index: int, grid: IntArray) -> dict[str, FloatArray]:
+        """Context of the `index`-th vehicle on some of its rows, shape (n,) each.
+
+        NaN where there is none (no lane to that side; off the road), infinite where a lane has nobody within reach.
+        Weather that the scenario does not state is absent.
+        """
+        entity = self.motion.entities[index]
+        road = _road(entity, self.network, grid)
+        step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING_DURATION
+        beside = _neighbours(self, index, grid, _lanes_there(road, step))
+        road = {name: _around(values, step) for name, values in road.items()}
+        return _own_motion(entity, grid) | road | beside | _weather(self.environments, entity, grid)
+
+    def traffic(self, first: int, every: int) -> _Traffic:
+        """On every so many rows of the run; the latest is kept, since vehicles ask for it one after another."""
+        if self._latest is None or self._latest[0] != (first, every):
+            self._latest = (first, every), _traffic(self.motion, self.network, first, every)
+        return self._latest[1]
+
+    @cached_property
+    def in_sight(self) -> list[tuple[slice, list[IntArray]]]:
+        """See `_in_sight`."""
+        return _in_sight(self.motion)
+
+    @cached_property
+    def environments(self) -> list[tuple[float, Environment]]:
+        """Environments that actions set, and when. [s]"""
+        actions = ((played.start, played.action.content) for played in self.motion.actions)
+        return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
+
+
+def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
+    """Context of one vehicle, see `Surroundings`."""
+    return Surroundings(motion, network).context(index, grid)
 
 
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
@@ -108,12 +137,13 @@ def _around(values: FloatArray, step: float) -> FloatArray:
 
 
 def _neighbours(
-    motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
+    surroundings: Surroundings, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
+    motion, network = surroundings.motion, surroundings.network
     observer = motion.entities[index]
     steps = np.diff(grid)
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
-    traffic = _traffic(motion, network, int(grid[0]) % every, every)
+    traffic = surroundings.traffic(int(grid[0]) % every, every)
     columns = grid // every
     nearby = around.Around.with_no_one(len(grid))
     groups = _own_lane_groups(observer, network, grid, traffic.direction[index, columns])
@@ -126,7 +156,7 @@ def _neighbours(
         + np.max(0.5 * extent.length + np.abs(extent.center_x))
         + 1.0
     )
-    for stretch, in_sight in _in_sight(motion):
+    for stretch, in_sight in surroundings.in_sight:
         numbers = np.array([k for k in in_sight[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
         inside = [slice(*np.searchsorted(grid[rows], (stretch.start, stretch.stop))) for rows, _, _ in groups]
         together = max(1, ROWS_TOGETHER // max(1, *(part.stop - part.start for part in inside), 1))
@@ -167,7 +197,6 @@ class _Traffic(NamedTuple):
             yield part.ravel()
 
 
-@lru_cache(maxsize=2)  # asked for every entity of one motion after another
 def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int) -> _Traffic:
     """On every so many rows of the run."""
     names = ("road", "lane", "s", "offset", "activity", "heading_relative")
@@ -220,7 +249,6 @@ _NEGLIGIBLE_SHARE = 1e-3
 """A share of a lane that is none. [-]"""
 
 
-@lru_cache(maxsize=1)  # asked for every entity of one motion after another
 def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
     """For rows of the run, and every entity, those near in space, whom alone it may see along its lane, in order."""
 
@@ -261,21 +289,16 @@ def _own_lane_groups(
     return result
 
 
-def _weather(motion: NominalMotion, entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
+def _weather(
+    environments: list[tuple[float, Environment]], entity: EntityMotion, grid: IntArray
+) -> dict[str, FloatArray]:
     time = entity.time[grid]
     context: dict[str, FloatArray] = {}
-    for start, environment in _environments(motion):
+    for start, environment in environments:
         since = time >= start - 1e-9
         for name, values in _stated(environment, time, start, entity.heading[grid]).items():
             context.setdefault(name, np.full(len(grid), np.nan))[since] = values[since]
     return context
-
-
-@lru_cache(maxsize=1)  # asked for every entity of one motion after another
-def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
-    """Environments that actions set, and when. [s]"""
-    actions = ((played.start, played.action.content) for played in motion.actions)
-    return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
 
 
 def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> dict[str, FloatArray]:
