@@ -11,11 +11,11 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.scenario.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
@@ -48,7 +48,7 @@ def test_every_corpus_distribution_gives_sets_that_load(shared: Path) -> None:
     assert found >= 16
 
 
-def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[str, WorldTrajectory]]:
+def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[str, Track]]:
     """Motion from the reference player's 10 Hz log; each event's actions are taken to start half a second apart."""
     rows = defaultdict(dict)
     with gzip.open(log, "rt") as file:
@@ -57,7 +57,7 @@ def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[st
             row = dict(zip(header, line.strip().split(","), strict=True))
             rows[row["name"]][round(float(row["time"]), 3)] = [float(row[key]) for key in ("x", "y", "z", "h", "speed")]
     time = np.array(sorted({moment for entity in rows.values() for moment in entity}))
-    entities, trajectories = [], {}
+    entities = []
     for entity in scenario.entities:
         if entity.name not in rows:
             continue
@@ -69,13 +69,11 @@ def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[st
         far = np.hypot(np.diff(x, prepend=x[0]), np.diff(y, prepend=y[0])) > 10.0
         activity[far] |= np.uint8(Activity.TELEPORTED)
         zero, nowhere = np.zeros(len(time)), np.zeros(len(time), np.int32)
-        entities.append(
-            EntityMotion(
-                entity, time, x, y, z, heading, zero, zero, speed, nowhere, nowhere, zero, zero, zero, activity
-            )
-        )
-        trajectories[entity.name] = WorldTrajectory(time, x, y, z, heading, zero, zero, speed)
-    return NominalMotion(0.1, tuple(entities), _actions(scenario), float(time[-1]), "stop trigger", ()), trajectories
+        columns = x, y, z, heading, zero, zero, speed, nowhere, nowhere, zero, zero, zero, activity
+        entities.append(EntityMotion.of(entity, time, **dict(zip(MOTION, columns, strict=True))))
+    end = {"end_time": float(time[-1]), "ended_by": "stop trigger", "notes": ()}
+    motion = NominalMotion(0.1, tuple(entities), _actions(scenario), **end)
+    return motion, {entity.name: entity for entity in entities}
 
 
 def _actions(scenario: Scenario) -> tuple[PlayedAction, ...]:

@@ -32,7 +32,6 @@ from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 
 DATA = Path(__file__).parents[1] / "data" / "xosc"
@@ -179,9 +178,7 @@ def test_mutated_scenarios_that_load_are_played_and_written_or_refused(folder: P
         if scenario.road_file is None:
             return
         motion = play(scenario, read_opendrive(scenario.road_file), step=0.02, time_limit=2.0)
-        paths = {
-            e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
-        }
+        paths = {e.name: e for e in motion.entities}
         write_converted(scenario, motion, paths, output, provenance={}, summary="fuzz")
     except XoscLateralError as error:
         assert "\n" not in str(error)

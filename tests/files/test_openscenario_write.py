@@ -29,6 +29,7 @@ from tests.kit.scenario_files import (
     write_scenario,
 )
 from xosc_lateral.base.errors import FormatError, PlaybackError
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.provenance import provenance_of
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -37,7 +38,6 @@ from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.position import Polyline, WorldPosition
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
@@ -66,10 +66,8 @@ def played(scenario: Scenario, limit: float = 20.0) -> NominalMotion:
     return play(scenario, read_opendrive(scenario.road_file), step=STEP, time_limit=limit)
 
 
-def nominal(motion: NominalMotion) -> dict[str, WorldTrajectory]:
-    return {
-        e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
-    }
+def nominal(motion: NominalMotion) -> dict[str, Track]:
+    return {e.name: e for e in motion.entities}
 
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
@@ -326,12 +324,7 @@ def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
     scenario = made(tmp_path)
     motion = played(scenario)
     trajectory = nominal(motion)["Ego"]
-    trajectory.x.setflags(write=True)
-    broken = WorldTrajectory(
-        trajectory.time,
-        np.where(trajectory.time > 1, np.nan, trajectory.x),
-        *(getattr(trajectory, name) for name in ("y", "z", "heading", "pitch", "roll", "speed")),
-    )
+    broken = trajectory.having(x=np.where(trajectory.time > 1, np.nan, trajectory.x))
     with pytest.raises(ValueError, match="not finite"):
         converted(scenario, tmp_path / "out.xosc", motion=motion, trajectories={"Ego": broken})
     assert not (tmp_path / "out.xosc").exists()

@@ -13,7 +13,7 @@ from msgspec import structs
 
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
 from xosc_lateral.files.output_tables import COLUMNS, states_csv, states_frame
-from xosc_lateral.world.motion.nominal import Activity, NominalMotion
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.surface import HeaderOffset
 
@@ -45,14 +45,14 @@ def test_entities_that_are_not_there_have_no_row(tmp_path: Path) -> None:
     ego = played.motion.entities[0]
     activity = ego.activity.copy()
     activity[:3] &= ~np.uint8(Activity.ACTIVE)
-    motion = replace(played.motion, entities=(replace(ego, activity=activity),))
+    motion = replace(played.motion, entities=(ego.having(activity=activity),))
     assert [row["time"] for row in table(motion, played.network)] == ["0.060", "0.080", "0.100"]
 
 
 def test_names_with_commas_and_quotes_come_back(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(last=0.1)
     ego = played.motion.entities[0]
-    odd = replace(ego, entity=structs.replace(ego.entity, name='a "b", c'))
+    odd = EntityMotion.of(structs.replace(ego.entity, name='a "b", c'), ego.time, **ego.columns)
     assert table(replace(played.motion, entities=(odd,)), played.network)[0]["name"] == 'a "b", c'
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from tests.kit.motion import drive, entity, together, two_roads
+from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.world.motion.gaps import BoxPath, Gap, smallest_gaps
+from xosc_lateral.world.motion.gaps import Gap, smallest_gaps
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Note
 from xosc_lateral.world.motion.segments import cut_segments
-from xosc_lateral.world.motion.trajectory import WorldTrajectory, displace
+from xosc_lateral.world.motion.trajectory import displace
 from xosc_lateral.world.road.network import RoadNetwork
 
 DURATION = 30.0
@@ -27,12 +29,12 @@ def made_enriched(folder: Path, *, amplitude: float = 0.3, notes: tuple[Note, ..
         _lane_changer(network),
         drive(network, entity("Slow"), lane=-3, start=60.0, speed=9.0, duration=DURATION),
     )
-    motion = type(motion)(motion.step, motion.entities, (), motion.end_time, "stop trigger", notes)
+    motion = replace(motion, actions=(), ended_by="stop trigger", notes=notes)
     entities = tuple(
         _swerving(each, network, amplitude * scale) if scale else _untouched(each, network)
         for each, scale in zip(motion.entities, (1.0, 0.7, 0.0), strict=True)
     )
-    before = _gaps([(each.motion, _nominal(each.motion)) for each in entities])
+    before = _gaps([(each.motion, each.motion) for each in entities])
     after = _gaps([(each.motion, each.trajectory) for each in entities])
     return Enriched(motion, network, entities, before, after, (), seed=1, variant=0, attempt=0)
 
@@ -59,26 +61,10 @@ def _lane_changer(network: RoadNetwork) -> EntityMotion:
     )
     late = done >= 0.5
     joined = {
-        name: np.where(late, getattr(left, name), getattr(right, name))
+        name: np.where(late, left.columns[name], right.columns[name])
         for name in ("x", "y", "z", "heading", "pitch", "roll", "lane", "s", "offset")
     }
-    return EntityMotion(
-        right.entity,
-        time,
-        joined["x"],
-        joined["y"],
-        joined["z"],
-        joined["heading"],
-        joined["pitch"],
-        joined["roll"],
-        right.speed,
-        right.road,
-        joined["lane"].astype(np.int32),
-        joined["s"],
-        joined["offset"],
-        np.zeros(len(time)),
-        activity,
-    )
+    return right.having(**joined)
 
 
 def _swerving(motion: EntityMotion, network: RoadNetwork, amplitude: float) -> EntityResult:
@@ -94,20 +80,11 @@ def _swerving(motion: EntityMotion, network: RoadNetwork, amplitude: float) -> E
 
 def _untouched(motion: EntityMotion, network: RoadNetwork) -> EntityResult:
     spans = cut_segments(motion, network)
-    return EntityResult(
-        motion, spans, None, "below 40 km/h throughout", (), np.zeros(len(motion.time)), _nominal(motion)
-    )
+    return EntityResult(motion, spans, None, "below 40 km/h throughout", (), np.zeros(len(motion.time)), motion)
 
 
-def _nominal(motion: EntityMotion) -> WorldTrajectory:
-    return WorldTrajectory(
-        motion.time, motion.x, motion.y, motion.z, motion.heading, motion.pitch, motion.roll, motion.speed
-    )
-
-
-def _gaps(paths: list[tuple[EntityMotion, WorldTrajectory]]) -> tuple[Gap, ...]:
-    boxes = [BoxPath(motion.name, path.x[::5], path.y[::5], path.heading[::5], 5.0, 2.0, 1.4) for motion, path in paths]
-    return smallest_gaps(paths[0][0].time[::5], boxes)
+def _gaps(paths: list[tuple[EntityMotion, Track]]) -> tuple[Gap, ...]:
+    return smallest_gaps([motion.having(x=path.x, y=path.y).at(slice(None, None, 5)) for motion, path in paths])
 
 
 def converted(enriched: Enriched, *warnings: str) -> Conversion:

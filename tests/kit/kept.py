@@ -26,7 +26,6 @@ from xosc_lateral.files.openscenario.write.draft import target
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import EntityMotion
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
 
 FOLDER = Path(__file__).parents[1] / "data" / "kept"
@@ -144,12 +143,9 @@ def outputs(seed: int) -> dict[str, str]:
     return hashes
 
 
-def _swerving(motion: EntityMotion) -> WorldTrajectory:
+def _swerving(motion: EntityMotion) -> EntityMotion:
     aside = 0.3 * np.sin(motion.time)
-    return WorldTrajectory(
-        motion.time, motion.x - aside * np.sin(motion.heading), motion.y + aside * np.cos(motion.heading), motion.z,
-        motion.heading, motion.pitch, motion.roll, motion.speed,
-    )  # fmt: skip
+    return motion.having(x=motion.x - aside * np.sin(motion.heading), y=motion.y + aside * np.cos(motion.heading))
 
 
 def _rows(*columns: Any) -> list[list[float | None]]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.workflows.detection.tracks import Rows, Scene, Size, Track, tracks_of
+from xosc_lateral.workflows.detection.tracks import LaneTrack, Scene, tracks_of
+from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 
 LANE, WIDTH, SPEED = 3.5, 1.9, 30.0
-SIZE = Size(4.6, WIDTH, 1.4)
 
 
 def lane_change(time: FloatArray, begin: float, duration: float, side: int = 1) -> FloatArray:
@@ -19,22 +19,23 @@ def lane_change(time: FloatArray, begin: float, duration: float, side: int = 1) 
 
 def track(
     lateral: FloatArray, *, name: str = "A", lane: int = 1, x: float = 0.0, speed: float = SPEED, step: float = 0.1
-) -> Track:
+) -> LaneTrack:
     """A vehicle on lane `lane` of three (0: right) that is `lateral` to the left of that lane's centre. [m]"""
     time = step * np.arange(len(lateral))
     across = np.round(lateral / LANE)
     n = len(time)
     along, left = x + speed * time, LANE * lane + lateral
-    rows = Rows(
-        time, lateral - LANE * across, np.full(n, LANE), np.full(n, speed), lane + across, np.full(n, 3.0),
-        np.ones(n, dtype=np.bool_), along, left, np.zeros(n), np.zeros(n, dtype=np.int64),
-        np.round(-1.0 - lane - across).astype(np.int64), along,
+    motion = EntityMotion.of(
+        made_vehicle(name, 4.6, WIDTH, 1.4), time, x=along, y=left, heading=np.zeros(n), speed=np.full(n, speed),
+        road=np.zeros(n, dtype=np.int32), lane=np.round(-1.0 - lane - across).astype(np.int32), s=along,
+        offset=lateral - LANE * across, lane_width=np.full(n, LANE), lane_index=lane + across,
+        lane_count=np.full(n, 3.0), following=np.ones(n, dtype=np.bool_),
     )  # fmt: skip
-    (made,) = tracks_of(name, rows, SIZE, cluster=name)
+    (made,) = tracks_of(motion, cluster=name)
     return made
 
 
-def scene(*tracks: Track, ego: str | None = None) -> Scene:
+def scene(*tracks: LaneTrack, ego: str | None = None) -> Scene:
     return Scene("made", tracks, ego)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
+from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, NominalMotion, PlayedAction, made_vehicle
 from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
@@ -91,23 +91,20 @@ def drive(
     poses = network.lane_to_world(road, lanes, s, offsets)
     if activity is None:
         activity = np.full(len(time), int(Activity.ACTIVE), dtype=np.uint8)
-    return EntityMotion(
-        who,
-        time,
-        *(np.array(part) for part in poses),
-        speed.copy(),
-        road,
-        lanes,
-        s,
-        offsets,
-        np.zeros(len(time)),
-        activity,
-    )
+    columns = *(np.array(part) for part in poses), speed, road, lanes, s, offsets, np.zeros(len(time)), activity
+    return EntityMotion.of(who, time, **dict(zip(MOTION, columns, strict=True)))
+
+
+def box_path(
+    time: np.ndarray, x: np.ndarray, y: np.ndarray, heading: np.ndarray, *box: float, name: str = "car"
+) -> EntityMotion:
+    """A box on its way: length, width and its centre ahead of the reference point [m]; x is NaN where it is absent."""
+    return EntityMotion.of(made_vehicle(name, *box), time, x=x, y=y, heading=heading)
 
 
 def together(*entities: EntityMotion, actions: tuple[PlayedAction, ...] = ()) -> NominalMotion:
     """A played scenario of these motions."""
-    return NominalMotion(STEP, entities, actions, float(entities[0].time[-1]), "time limit", ())
+    return NominalMotion(STEP, entities, actions, end_time=float(entities[0].time[-1]), ended_by="time limit", notes=())
 
 
 __all__ = ["LANE_WIDTH", "RADIUS", "STEP", "distance_driven", "drive", "entity", "together", "two_roads"]

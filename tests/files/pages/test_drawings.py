@@ -133,8 +133,7 @@ def test_a_thumbnail_holds_every_path_inside_its_border_from_left_to_right(enric
 
 def test_who_never_appears_is_not_drawn_and_a_scenario_of_nobody_is_empty(enriched):
     absent = [
-        replace(one, motion=replace(one.motion, activity=np.zeros_like(one.motion.activity)))
-        for one in enriched.entities
+        replace(one, motion=one.motion.having(activity=np.zeros_like(one.motion.activity))) for one in enriched.entities
     ]
     some = replace(enriched, entities=(enriched.entities[0], *absent[1:]))
     assert thumbnail(some).count("<circle") == 1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from msgspec import structs
@@ -84,7 +82,7 @@ def test_lane_changes_cross_markings_anyway(network: RoadNetwork) -> None:
     motion = drive(network, entity(), activity=lateral(slice(100, 500)))
     lanes = motion.lane.copy()
     lanes[300:] = -1
-    changing = replace(motion, lane=lanes)
+    changing = motion.having(lane=lanes)
     assert not list(lane_departures(result(network, changing, (HALF + 0.3) * BUMP), network))
 
 

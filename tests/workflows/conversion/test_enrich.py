@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import erf, sqrt
 from pathlib import Path
 
@@ -93,10 +92,11 @@ def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what
     activity[400:600] |= int(Activity.LATERAL)
     motion = drive(network, entity(), duration=20.0, activity=activity)
     if what == "slow":
-        motion.speed[480:520] = 5.0
+        at = np.arange(1001)
+        motion = motion.having(speed=np.where((at >= 480) & (at < 520), 5.0, motion.speed))
     else:
         activity[500] |= int(Activity.TELEPORTED)
-    motion = replace(motion, activity=activity)
+    motion = motion.having(activity=activity)
     found = [
         enrich(SegmentedRun(together(motion), network, continuous=names), {"car": simulated_profile()}, seed=1)
         .entities[0]
@@ -205,7 +205,7 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
 def test_a_nominal_jump_is_told_with_time_and_length(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     whole = drive(network, entity())
-    motion = together(replace(whole, y=whole.y + np.where(whole.time < 3.99, 0.0, 1.9)))
+    motion = together(whole.having(y=whole.y + np.where(whole.time < 3.99, 0.0, 1.9)))
     (warning,) = enrich(SegmentedRun(motion, network), {}, seed=1).warnings()
     assert warning.startswith("car jumps 2.0 m at 4.0 s, as in the nominal motion: ")
 

@@ -88,8 +88,8 @@ def test_provenance_is_in_the_footer(plain):
 
 def test_an_entity_that_stands_still_or_is_absent_breaks_no_figure(enriched):
     motion = enriched.entity("Slow").motion
-    still = replace(motion, x=np.full_like(motion.x, 5.0), y=np.zeros_like(motion.y))
-    absent = replace(motion, activity=np.zeros_like(motion.activity))
+    still = motion.having(x=np.full_like(motion.x, 5.0), y=np.zeros_like(motion.y))
+    absent = motion.having(activity=np.zeros_like(motion.activity))
     for odd in (still, absent):
         entity = replace(enriched.entity("Slow"), motion=odd)
         alone = replace(enriched, entities=(entity,), gaps_before=(), gaps_after=())

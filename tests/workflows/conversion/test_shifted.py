@@ -50,7 +50,7 @@ def _chain(entity: str, after: tuple[str, ...] | None) -> OffsetChain:
 
 
 def _nobody() -> NominalMotion:
-    return NominalMotion(0.02, (), (), 20.0, "stop trigger", ())
+    return NominalMotion(0.02, (), end_time=20.0, ended_by="stop trigger", notes=())
 
 
 def test_the_smallest_change_that_helps_is_one_chain_of_one_vehicle() -> None:

@@ -12,6 +12,12 @@ import pytest
 import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, weave
 from xosc_lateral.cli import main
+from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, views_of
+from xosc_lateral.workflows.detection.page import clip_scene
+from xosc_lateral.workflows.detection.scoring import Case
+from xosc_lateral.workflows.detection.sources import played_scene
+from xosc_lateral.workflows.detection.tracks import STEP
 
 
 @pytest.fixture
@@ -119,3 +125,17 @@ def test_what_can_t_be_meant_is_one_line(words, code, what, folder, capsys):
     assert main(["detect", *words]) == code
     assert what in " ".join(capsys.readouterr().err.split())
     assert sorted(folder.iterdir()) == before
+
+
+def test_in_a_clip_a_lane_change_does_not_turn_the_road(folder):
+    played = play_scenario(folder / "cut-in.xosc", step=STEP)
+    scene = played_scene(played, "cut-in", "none")
+    view = next(one for one in views_of(scene, PERFECT_SENSOR, 0) if one.track.name == "CutIn" and one.truth.changes)
+    track, moment = view.track, view.truth.changes[0].crossing
+    clip = clip_scene(Case("missed", scene, view, float(track.time[moment]), 0.0, np.zeros(len(track)), 1.0))
+    shown = json.loads(clip)["entities"][0]
+    rows = np.clip(moment + np.arange(-120, 121), 0, len(track) - 1)[:: round(0.1 / STEP)]
+    lane = played.network.lane_to_world(track.road[rows], track.lane[rows], track.s[rows]).heading
+    course = shown["course"]["r"] * np.cumsum(shown["course"]["d"])
+    assert shown["name"] == "CutIn" and np.ptp(track.heading_relative[rows]) > 0.02
+    np.testing.assert_allclose(np.exp(1j * course), np.exp(1j * lane), atol=1e-3)

@@ -47,7 +47,7 @@ def test_an_excursion_that_comes_back_is_neither_a_lane_change_nor_lane_keeping(
 
 def test_who_drives_slowly_keeps_no_lane():
     made = track(np.zeros(400))
-    made.rows.following[:] = False
+    made = made.having(following=np.zeros(len(made), dtype=np.bool_))
     assert not truth_of(made).keeping.any()
 
 

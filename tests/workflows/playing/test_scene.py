@@ -15,7 +15,6 @@ from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import Enriched
 from xosc_lateral.workflows.playing.scene import packed, scene_of
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.geometry import simplify
 
 
@@ -113,13 +112,12 @@ def test_ten_cars_for_a_minute_stay_under_a_megabyte(tmp_path):
         for k, (lane, start) in enumerate(starts)
     ]
     wander = np.random.default_rng(1).normal(scale=0.3, size=len(cars[0].time))
-    names = ("time", "x", "y", "z", "heading", "pitch", "roll", "speed")
     results = tuple(
         replace(
             base.entity("Ego"),
             motion=car,
             deviation=wander,
-            trajectory=WorldTrajectory(*(getattr(car, name) + (wander if name in "xy" else 0.0) for name in names)),
+            trajectory=car.having(x=car.x + wander, y=car.y + wander),
         )
         for car in cars
     )
@@ -143,7 +141,7 @@ def test_a_name_cannot_end_the_script_that_holds_it(tmp_path):
 
 def test_a_page_with_no_present_entity_has_an_empty_player(enriched):
     alone = enriched.entity("Slow")
-    gone = replace(alone, motion=replace(alone.motion, activity=np.zeros_like(alone.motion.activity)))
+    gone = replace(alone, motion=alone.motion.having(activity=np.zeros_like(alone.motion.activity)))
     nobody = replace(enriched, motion=together(gone.motion), entities=(gone,), gaps_before=(), gaps_after=())
     assert json.loads(enriched_scene(nobody))["entities"] == []
     assert "Player" in conversion_page(converted(nobody))

@@ -6,20 +6,22 @@ import numpy as np
 import pytest
 
 from xosc_lateral.workflows.recordings.lateral import SHAPES, lateral_plan
-from xosc_lateral.workflows.recordings.recorded import RecordedVehicle
+from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
 WIDTH = 3.5
 TIME = np.arange(0.0, 40.05, 0.1)
 
 
-def recorded(y: np.ndarray, time: np.ndarray = TIME) -> RecordedVehicle:
+def recorded(y: np.ndarray, time: np.ndarray = TIME) -> EntityMotion:
     """A car at a lateral position [m] counted from the centre of the lane with number 0."""
     lanes = np.floor(y / WIDTH + 0.5)
     n = len(time)
-    whole = np.zeros(n, dtype=np.int64)
-    at = (time, 30.0 * time, y, whole, -3 - lanes.astype(np.int64), 30.0 * time, y - WIDTH * lanes)
-    return RecordedVehicle("a", "car", 4.5, 1.8, 1.5, 1.4, *at, np.full(n, WIDTH), np.ones(n, dtype=np.int64))
+    return EntityMotion.of(
+        made_vehicle("a", 4.5, 1.8, 1.4), time, x=30.0 * time, y=y, road=np.zeros(n, dtype=np.int32),
+        lane=-3 - lanes.astype(np.int32), s=30.0 * time, offset=y - WIDTH * lanes, lane_width=np.full(n, WIDTH),
+        heading_relative=np.zeros(n),
+    )  # fmt: skip
 
 
 def sway(seed: int, rms: float = 0.2) -> np.ndarray:

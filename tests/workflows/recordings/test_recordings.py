@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.kit.motion import LANE_WIDTH, two_roads
 from tests.workflows.recordings.test_importers import _dlr_recording
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad, curved_plan
-from xosc_lateral.workflows.recordings.recorded import place_tracks
+from xosc_lateral.workflows.recordings.recorded import RecordedTrack, own_lateral, place_tracks
 from xosc_lateral.workflows.recordings.recordings import format_of, read_recording
+from xosc_lateral.world.motion.nominal import made_vehicle
 from xosc_lateral.world.road.reference_line import ReferenceLine
 
 
@@ -73,3 +75,13 @@ def test_formats_are_told_from_names(tmp_path):
     assert {name: format_of(Path(name)) for name in names} == names
     assert format_of(Path("tracks.parquet")) == "tracks"
     assert format_of(tmp_path) == "levelx"
+
+
+def test_against_its_lane_an_offset_is_left_of_the_lane_and_its_lateral_left_of_its_own_travel(tmp_path):
+    network, time = two_roads(tmp_path), np.arange(0.0, 12.0, 0.1)
+    columns = {"x": 20.0 + 20.0 * time, "y": np.full(len(time), 0.5 * LANE_WIDTH + 0.3), "heading": np.zeros(len(time))}
+    track = RecordedTrack("a", time, columns, np.empty(0, dtype=np.intp), made_vehicle("a", 4.5, 1.8, 1.4), 0.0)
+    (vehicle,) = place_tracks([track], network, 0.0, 12.0).vehicles
+    assert set(vehicle.lane.tolist()) == {1} and set(vehicle.way().tolist()) == {-1}
+    np.testing.assert_allclose(vehicle.offset, -0.3, atol=1e-9)
+    np.testing.assert_allclose(own_lateral(vehicle)[0], 0.3, atol=1e-9)

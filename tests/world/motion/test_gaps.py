@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.world.motion.gaps import BoxPath, box_distance, corners, smallest_gaps
+from tests.kit.motion import box_path
+from xosc_lateral.world.motion.gaps import box_distance, corners, smallest_gaps
+from xosc_lateral.world.motion.nominal import EntityMotion
 
 
-def _box(x: float, y: float, heading: float = 0.0, length: float = 5.0, width: float = 2.0) -> BoxPath:
-    return BoxPath("car", np.array([x]), np.array([y]), np.array([heading]), length, width, 0.0)
+def _box(x: float, y: float, heading: float = 0.0, length: float = 5.0, width: float = 2.0) -> EntityMotion:
+    return box_path(np.zeros(1), np.array([x]), np.array([y]), np.array([heading]), length, width, 0.0)
 
 
-def _corners(box: BoxPath) -> np.ndarray:
+def _corners(box: EntityMotion) -> np.ndarray:
     return corners([(box, np.arange(len(box.x)))])
 
 
@@ -33,7 +35,7 @@ def _edge_points(corners: np.ndarray, share: np.ndarray) -> np.ndarray:
     ],
     ids=["ahead", "beside", "diagonal", "across", "overlapping corners", "one inside the other", "crossing"],
 )
-def test_distance_of_hand_made_boxes(other: BoxPath, expected: float) -> None:
+def test_distance_of_hand_made_boxes(other: EntityMotion, expected: float) -> None:
     assert box_distance(_corners(_box(0.0, 0.0)), _corners(other))[0] == pytest.approx(expected, abs=1e-9)
 
 
@@ -52,10 +54,10 @@ def test_the_smallest_gap_names_pair_and_moment_and_absent_vehicles_do_not_count
     time = np.linspace(0.0, 10.0, 101)
     still, zero = np.zeros_like(time), np.zeros_like(time)
     coming = np.linspace(60.0, 10.0, 101)
-    a = BoxPath("a", still, zero, zero, 4.0, 2.0, 0.0)
-    b = BoxPath("b", coming, zero, zero, 4.0, 2.0, 1.0)
-    gone = BoxPath("gone", np.where(time < 5.0, np.nan, 300.0), zero, zero, 4.0, 2.0, 0.0)
-    (gap,) = smallest_gaps(time, [a, b, gone])
+    a = box_path(time, still, zero, zero, 4.0, 2.0, 0.0, name="a")
+    b = box_path(time, coming, zero, zero, 4.0, 2.0, 1.0, name="b")
+    gone = box_path(time, np.where(time < 5.0, np.nan, 300.0), zero, zero, 4.0, 2.0, 0.0, name="gone")
+    (gap,) = smallest_gaps([a, b, gone])
     assert gap.names == ("a", "b")
     assert gap.distance == pytest.approx(7.0)
     assert gap.time == pytest.approx(10.0)

@@ -57,9 +57,9 @@ def test_a_teleport_cuts_and_only_who_drives_across_the_lane_follows_none(tmp_pa
     activity[250] |= int(Activity.TELEPORTED)
     motion = drive(network, entity(), activity=activity)
     assert [span.first for span in cut_segments(motion, network)] == [0, 250]
-    motion.heading_relative[:] = np.pi  # overtaking on the lane of those who come towards it
+    motion = motion.having(heading_relative=np.full(501, np.pi))  # overtaking on the lane of those who come towards it
     assert all(span.is_road_following for span in cut_segments(motion, network))
-    motion.heading_relative[:] = np.pi / 2
+    motion = motion.having(heading_relative=np.full(501, np.pi / 2))
     assert {span.kind for span in cut_segments(motion, network)} == {SegmentKind.ACROSS_LANE}
 
 

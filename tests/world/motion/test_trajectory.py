@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,15 +49,15 @@ def test_heading_and_speed_follow_the_shifted_path(tmp_path: Path) -> None:
 def test_a_leap_is_found_where_nobody_is_placed_anew(tmp_path: Path) -> None:
     motion = drive(two_roads(tmp_path), entity(), start=50.0)
     assert leaps(motion) == []
-    aside = replace(motion, y=motion.y + np.where(motion.time < 3.99, 0.0, 1.9))
+    aside = motion.having(y=motion.y + np.where(motion.time < 3.99, 0.0, 1.9))
     assert leaps(aside) == [(pytest.approx(4.0), pytest.approx(np.hypot(1.9, 30.0 * 0.02)))]
     activity = aside.activity | np.where(np.arange(len(motion.time)) == 200, int(Activity.TELEPORTED), 0)
-    assert leaps(replace(aside, activity=activity.astype(np.uint8))) == []
+    assert leaps(aside.having(activity=activity.astype(np.uint8))) == []
 
 
 def test_no_lateral_action_is_a_leap(tmp_path: Path) -> None:
     motion = drive(two_roads(tmp_path), entity(), start=50.0)
-    assert leaps(replace(motion, y=motion.y + np.clip(9.0 * (motion.time - 4.0), 0.0, 3.5))) == []
+    assert leaps(motion.having(y=motion.y + np.clip(9.0 * (motion.time - 4.0), 0.0, 3.5))) == []
 
 
 def test_inside_of_a_left_curve_is_driven_slower(tmp_path: Path) -> None:
@@ -76,7 +75,7 @@ def test_heading_is_held_at_standstill_and_rows_off_the_road_stay(tmp_path: Path
     path = displace(motion, network, 0.02 * distance_driven(motion))
     assert np.ptp(path.heading[:199]) < 1e-9
     np.testing.assert_allclose(path.heading[210:], path.heading[205], atol=0)
-    motion.road[300:] = -1
+    motion = motion.having(road=np.where(time < 300, motion.road, -1).astype(np.int32))
     off = displace(motion, network, np.full(len(time), 0.3))
     assert (off.x[300:] == motion.x[300:]).all()
 
@@ -86,5 +85,5 @@ def test_being_placed_anew_is_no_driving(tmp_path: Path) -> None:
     activity = np.full(501, int(Activity.ACTIVE), dtype=np.uint8)
     activity[250] |= int(Activity.TELEPORTED)
     motion = drive(network, entity(), activity=activity)
-    motion.x[250:] += 100.0
+    motion = motion.having(x=motion.x + np.where(np.arange(501) < 250, 0.0, 100.0))
     assert distance_driven(motion)[-1] == pytest.approx(499 * 0.6)

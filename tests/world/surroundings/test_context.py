@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -130,8 +129,8 @@ def test_against_the_lanes_traffic_everything_is_seen_the_other_way_round(tmp_pa
         drive(network, entity("behind"), lane=-3, start=600.0),
         drive(network, entity("same way"), lane=-3, start=500.0),
     ]
-    for one in (own, others[0], others[2]):
-        one.heading_relative[:] = np.pi
+    turned = {"heading_relative": np.full(len(own), np.pi)}
+    own, others[0], others[2] = (one.having(**turned) for one in (own, others[0], others[2]))
     context = entity_context(together(own, *others), network, 0, GRID)
     assert set(context["right_distance"]) == {0.0} and set(context["lane_index"]) == {2.0}
     assert np.isnan(context["left_distance"]).all()
@@ -182,7 +181,7 @@ def _changing(network: RoadNetwork, who: Entity, lane: int, to_left: float, star
     beyond = np.abs(across) > 0.5 * LANE_WIDTH
     motion = drive(network, who, lane=lane, start=start, offset=across)
     lanes = np.where(beyond, lane + inward * int(to_left), lane).astype(np.int32)
-    return replace(motion, lane=lanes, offset=np.where(beyond, across - to_left * LANE_WIDTH, across))
+    return motion.having(lane=lanes, offset=np.where(beyond, across - to_left * LANE_WIDTH, across))
 
 
 @pytest.mark.parametrize("lane", [-2, 2])

@@ -7,8 +7,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from tests.kit.motion import box_path
 from xosc_lateral.world.motion import gaps
-from xosc_lateral.world.motion.gaps import BoxPath, smallest_gaps
+from xosc_lateral.world.motion.gaps import smallest_gaps
 from xosc_lateral.world.surroundings.around import stretches_within
 
 
@@ -44,13 +45,13 @@ def test_no_pair_that_comes_near_is_missing_and_few_others_are_there(seed: int, 
 
 def test_gaps_are_those_of_all_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
     x, y = paths(25, 3, 0.3)
-    boxes = [BoxPath(f"v{k}", x[k], y[k], np.full(300, 0.3), 4.0 + k % 9, 2.0, 1.0) for k in range(len(x))]
-    time = np.arange(300) / 50
-    indexed = smallest_gaps(time, boxes)
+    time, turned = np.arange(300) / 50, np.full(300, 0.3)
+    boxes = [box_path(time, x[k], y[k], turned, 4.0 + k % 9, 2.0, 1.0, name=f"v{k}") for k in range(len(x))]
+    indexed = smallest_gaps(boxes)
     monkeypatch.setattr(
         gaps, "stretches_within", lambda x, y, reach: [(slice(0, len(x[0])), list(combinations(range(len(x)), 2)))]
     )
-    assert indexed == smallest_gaps(time, boxes)
+    assert indexed == smallest_gaps(boxes)
     assert len(indexed) > 5
 
 

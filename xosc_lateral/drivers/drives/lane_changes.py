@@ -10,6 +10,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.track import lane_levels
 
 SETTLED_OFFSET = 0.7  # nobody has settled in a lane who is farther from its centre: 1.8 m touch a marking at 0.95 m [m]
 CALM_RATE = 0.1  # a lane change reaches back and forth to where the lateral speed falls below this [m/s]
@@ -33,16 +34,6 @@ class Rough:
     held: bool = False
     aborted: bool = False
     cut: bool = False
-
-
-def lane_levels(offset: FloatArray, lane_width: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left; shape (n,).
-
-    A step of the offset by more than half a lane is a new lane; one lane that goes over into another ahead has none.
-    """
-    step, width = np.diff(offset), 0.5 * (lane_width[1:] + lane_width[:-1])
-    lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
-    return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
 
 
 def lateral_speed(time: FloatArray, y: FloatArray) -> FloatArray:

@@ -15,12 +15,12 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.track import Track
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import replace_atomically
 from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.osi.lanes import RoadIds, write_lanes
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, axes
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic, axes
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
@@ -53,9 +53,9 @@ running lights, and no words for a light of the user's own."""
 
 def write_osi(
     path: Path,
-    motion: NominalMotion,
+    motion: Traffic,
     network: RoadNetwork,
-    trajectories: Sequence[WorldTrajectory] | None = None,
+    trajectories: Sequence[Track] | None = None,
     *,
     host: str | None = None,
     description: str = "",
@@ -72,7 +72,7 @@ def write_osi(
     return replace_atomically(path, lambda temporary: _save(temporary, messages, description))
 
 
-def host_of(motion: NominalMotion, under_test: Iterable[str]) -> str | None:
+def host_of(motion: Traffic, under_test: Iterable[str]) -> str | None:
     """Host vehicle: the first under test, else the one whose name is ego; None: there is neither."""
     ego = (entity.name for entity in motion.entities if entity.name.casefold() == "ego")
     return next(iter(under_test), None) or next(ego, None)
@@ -110,16 +110,16 @@ def _save(path: Path, messages: Iterator[Any], description: str) -> None:
 
 
 def ground_truths(
-    motion: NominalMotion,
+    motion: Traffic,
     network: RoadNetwork,
-    trajectories: Sequence[WorldTrajectory] | None = None,
+    trajectories: Sequence[Track] | None = None,
     *,
     host: str | None = None,
 ) -> Iterator[Any]:
     """One `GroundTruth` after the other; parameters as for `write_osi`."""
     ground_truth = osi("osi3.osi_groundtruth_pb2").GroundTruth
     ids = RoadIds(network, len(motion.entities) + 1)
-    paths: Sequence[WorldTrajectory | None] = [None] * len(motion.entities) if trajectories is None else trajectories
+    paths: Sequence[Track | None] = [None] * len(motion.entities) if trajectories is None else trajectories
     objects = [
         _Object(entity, _kinematics(entity, path, network), _template(entity.entity, number), _lights(motion, entity))
         for number, (entity, path) in enumerate(zip(motion.entities, paths, strict=True), 1)
@@ -176,7 +176,7 @@ class _Object:
             written.moving_object_classification.assigned_lane_id.add().value = number
 
 
-def _kinematics(motion: EntityMotion, path: WorldTrajectory | None, network: RoadNetwork) -> FloatArray:
+def _kinematics(motion: EntityMotion, path: Track | None, network: RoadNetwork) -> FloatArray:
     """Centre of the box, its velocity and acceleration, yaw, pitch, roll, yaw rate, road, lane, s; shape (n, 16)."""
     pose = motion if path is None else path
     x, y, z, heading = network.header_offset.apply(pose.x, pose.y, pose.z, pose.heading)
@@ -210,7 +210,7 @@ def _rate(values: FloatArray, motion: EntityMotion) -> FloatArray:
     return rates
 
 
-def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, Any]]:
+def _lights(motion: Traffic, entity: EntityMotion) -> list[tuple[float, Any]]:
     """States of a vehicle's lights, in the order of time; what the scenario says nothing of stays unset."""
     kinds = osi("osi3.osi_object_pb2").MovingObject.VehicleClassification
     state, states_over_time = kinds.LightState(), []

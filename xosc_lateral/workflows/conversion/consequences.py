@@ -24,7 +24,7 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> Iterator[Lane
         worst: LaneDeparture | None = None
         for rows in blocks(last + 1, first):
             half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-            along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+            along_lane = motion.way(rows)
             beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
             outside = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
             k = int(np.argmax(np.where(outside, beyond, -np.inf)))

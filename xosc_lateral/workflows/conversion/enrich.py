@@ -24,7 +24,6 @@ from xosc_lateral.workflows.conversion.result import (
     LaneChanges,
     Neighbours,
     SampledSegment,
-    nominal_path,
     untouched,
 )
 from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
@@ -214,7 +213,7 @@ class SegmentedRun:
             tuple(crossings(motion, entity, runs)) for entity, runs in zip(motion.entities, self.runs, strict=True)
         ]
         """Lane changes and lane offsets in them."""
-        self.gaps = gaps_of(motion, [nominal_path(entity) for entity in motion.entities])
+        self.gaps = gaps_of(motion, motion.entities)
         certain = tuple(one for one in motion.entities if one.name not in self.uncertain)
         self._certain = Surroundings(replace(motion, entities=certain), network)
         self._seen: dict[int, tuple[DriverProfile, Seen]] = {}

@@ -15,15 +15,15 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
-from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain, Size, resized
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
@@ -318,13 +318,11 @@ def _measured(entity: EntityResult, played: EntityMotion) -> EntityResult:
     """One entity where it is when the output is played, held where that ends first."""
     motion = entity.motion
     rows = np.minimum(np.arange(len(motion.time)), len(played.time) - 1)
-    x, y, z, heading, pitch, roll, speed = (
-        np.asarray(getattr(played, name)[rows]) for name in ("x", "y", "z", "heading", "pitch", "roll", "speed")
-    )
-    deviation: FloatArray = (y - motion.y) * np.cos(motion.heading) - (x - motion.x) * np.sin(motion.heading)
+    path = Track(motion.name, motion.time, {name: played.columns[name][rows] for name in POSE}, motion.breaks)
+    across, ahead = path.y - motion.y, path.x - motion.x
+    deviation: FloatArray = across * np.cos(motion.heading) - ahead * np.sin(motion.heading)
     segments = tuple(
         replace(segment, offset=np.interp(segment.time, motion.time, deviation), beyond=np.empty(0))
         for segment in entity.segments
     )
-    trajectory = WorldTrajectory(motion.time, x, y, z, heading, pitch, roll, speed)
-    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
+    return replace(entity, segments=segments, deviation=deviation, trajectory=path)

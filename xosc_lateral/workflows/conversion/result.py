@@ -12,12 +12,13 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
-from xosc_lateral.world.motion.trajectory import WorldTrajectory, leaps
+from xosc_lateral.world.motion.trajectory import leaps
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control
 
@@ -70,7 +71,7 @@ class EntityResult:
     why: str  # why it was not enriched; empty if it was
     segments: tuple[SampledSegment, ...]
     deviation: FloatArray  # of that path from the nominal one, positive left, shape (rows,) [m]
-    trajectory: WorldTrajectory  # the enriched path; the nominal one of an entity that is neither enriched nor towed
+    trajectory: Track  # the enriched path; the nominal motion of an entity that is neither enriched nor towed
     # neutral: context columns that the profile's effects ask for and that were not known: without effect
     neutral: tuple[str, ...] = ()
     # bound: that sampled movement was smoothed since nobody could have driven it: the worst segment's
@@ -118,14 +119,7 @@ class EntityResult:
 def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
     """An entity as it moves nominally."""
     no_deviation = np.broadcast_to(0.0, len(entity.time))
-    return EntityResult(entity, spans, None, why, (), no_deviation, nominal_path(entity))
-
-
-def nominal_path(entity: EntityMotion) -> WorldTrajectory:
-    """Its nominal motion as a path."""
-    return WorldTrajectory(
-        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
-    )
+    return EntityResult(entity, spans, None, why, (), no_deviation, entity)
 
 
 def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:

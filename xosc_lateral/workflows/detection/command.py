@@ -85,22 +85,21 @@ def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any]
 
 def _columns(track: Any, measured: Any, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
     """Values of a track that change, as lists, and those that don't; what is not known is left out."""
-    rows = track.rows
     taken = np.arange(len(track)) if measured is None else measured.taken
-    offset = rows.offset if measured is None else measured.offset
-    values: dict[str, Any] = {"offset": offset, "lane_width": rows.lane_width[taken], "speed": rows.speed[taken]}
+    offset = track.offset if measured is None else measured.offset
+    values: dict[str, Any] = {"offset": offset, "lane_width": track.lane_width[taken], "speed": track.speed[taken]}
     if measured is not None:
         values["lateral_speed"] = measured.speed
-    if np.isfinite(rows.x).all():
-        values |= {"x": rows.x[taken], "y": rows.y[taken], "heading": rows.heading[taken]}
+    if "x" in track.columns:
+        values |= {"x": track.x[taken], "y": track.y[taken], "heading": track.heading[taken]}
     columns: dict[str, list[Any]] = {name: np.round(one, 6).tolist() for name, one in values.items()}
-    if scene.network is not None and (rows.road >= 0).all():
+    if scene.network is not None and "road" in track.columns:
         ids = scene.network.road_ids
-        columns["road"] = [ids[number] for number in rows.road[taken].tolist()]
-        columns |= {"lane": rows.lane[taken].tolist(), "s": np.round(rows.s[taken], 3).tolist()}
-    if np.isnan(rows.speed).any():
+        columns["road"] = [ids[number] for number in track.road[taken].tolist()]
+        columns |= {"lane": track.lane[taken].tolist(), "s": np.round(track.s[taken], 3).tolist()}
+    if np.isnan(track.speed).any():
         del columns["speed"]
-    size = {"length": track.size.length, "width": track.size.width, "center_x": track.size.ahead}
+    size = {name: getattr(track.box, name) for name in ("length", "width", "center_x")}
     return columns, {name: round(value, 3) for name, value in size.items()}
 
 

@@ -252,7 +252,7 @@ class FuzzySafety(Rule):
         assert seen is not None
         other = seen.speed - seen.closing
         metric = proactive_metric(seen.gap, seen.speed, other) + critical_metric(seen.gap, seen.speed, other)
-        length = view.track.size.length
+        length = view.track.box.length
         unsafe = crosses_in_time(view.lateral_speed, seen, length)
         return np.where(unsafe & np.isfinite(metric), np.nan_to_num(metric), NO_DANGER)
 

@@ -9,7 +9,7 @@ from zlib import crc32
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.workflows.detection.tracks import STEP, Scene, Track, Truth, truth_of
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, Truth, truth_of
 
 RATE_WINDOW = 0.5
 """Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
@@ -81,7 +81,7 @@ class Measured:
     acceleration: FloatArray  # lateral, positive left [m/s2]
 
 
-def measure(track: Track, sensor: Sensor, rng: np.random.Generator) -> Measured:
+def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measured:
     """What a sensor gives of a track."""
     taken = np.maximum(sensor.taken(track.first, len(track)), 0)
     position = track.lateral
@@ -114,7 +114,7 @@ class View:
     """A vehicle seen from the lane on one side of it; arrays of shape (n,)."""
 
     number: int  # of the track in its scene
-    track: Track
+    track: LaneTrack
     side: int  # of that lane: 1: left, -1: right
     truth: Truth
     measured: Measured
@@ -139,8 +139,8 @@ class View:
     @property
     def room(self) -> FloatArray:
         """From the vehicle's side to the marking, negative beyond it. [m]"""
-        width = self.track.rows.lane_width[self.measured.taken]
-        return np.asarray(0.5 * (width - self.track.size.width) - self.towards)
+        width = self.track.lane_width[self.measured.taken]
+        return np.asarray(0.5 * (width - self.track.box.width) - self.towards)
 
 
 def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = True) -> list[View]:
@@ -165,18 +165,18 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
     return views
 
 
-def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observer:
+def _observer(scene: Scene, track: LaneTrack, side: int, taken: IntArray) -> Observer:
     """The ego where it is in the next lane, not ahead; else the nearest vehicle behind in that lane."""
     n = len(track)
     nearest = np.full(n, np.inf)
     values = np.full((5, n), np.nan)
     for other, mine, theirs in _together(scene, track):
-        a, b = track.rows, other.rows
+        a, b = track, other
         dx, dy = a.x[mine] - b.x[theirs], a.y[mine] - b.y[theirs]
         cos, sin = np.cos(b.heading[theirs]), np.sin(b.heading[theirs])
-        ahead = dx * cos + dy * sin + track.size.ahead - other.size.ahead
+        ahead = dx * cos + dy * sin + track.box.center_x - other.box.center_x
         across = np.abs(dy * cos - dx * sin)
-        lengths = 0.5 * (track.size.length + other.size.length)
+        lengths = 0.5 * (track.box.length + other.box.length)
         same_way = np.cos(a.heading[mine] - b.heading[theirs]) > 0.5
         beside = b.lane_index[theirs] - a.lane_index[mine] == side
         near = (a.road[mine] == b.road[theirs]) | (across < CARRIAGEWAY_DISTANCE)
@@ -185,14 +185,14 @@ def _observer(scene: Scene, track: Track, side: int, taken: IntArray) -> Observe
         at = mine.start + rows
         nearest[at] = ahead[rows]
         widths = 0.5 * (a.lane_width[mine] + b.lane_width[theirs])
-        apart = widths - side * (a.offset[mine] - b.offset[theirs]) - 0.5 * (track.size.width + other.size.width)
+        apart = widths - side * (a.offset[mine] - b.offset[theirs]) - 0.5 * (track.box.width + other.box.width)
         speed = b.speed[theirs]
-        columns = ahead - lengths, speed - a.speed[mine], apart, speed, np.full(len(speed), other.size.length)
+        columns = ahead - lengths, speed - a.speed[mine], apart, speed, np.full(len(speed), other.box.length)
         values[:, at] = np.array(columns)[:, rows]
     return Observer(*values[:, taken])
 
 
-def _together(scene: Scene, track: Track) -> Iterator[tuple[Track, slice, slice]]:
+def _together(scene: Scene, track: LaneTrack) -> Iterator[tuple[LaneTrack, slice, slice]]:
     """Tracks that exist at the same time, the ego's alone if there is one, with the rows of both."""
     for other in scene.tracks:
         if other is not track and scene.ego in (None, other.name):

@@ -10,19 +10,14 @@ from xosc_lateral.files.pages.chart import ENRICHED, INK, color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Html, Page
 from xosc_lateral.workflows.detection.scoring import Case, Curve
-from xosc_lateral.workflows.detection.tracks import STEP, Track
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.scenario.entity import BoundingBox, Entity
-from xosc_lateral.world.scenario.enums import EntityCategory
-from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
 
 LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
 NEAR_DISTANCE = 120.0
 """Vehicles farther from the case's are left out. [m]"""
-VEHICLE_HEIGHT = 1.5
-"""Nobody sees it from above. [m]"""
 CASE_MARGIN = 6.0
 """Of a case, before and after its moment. [s]"""
 
@@ -98,7 +93,7 @@ def _case_figure(case: Case) -> Figure:
         panel.across(float(time[first]), float(time[last - 1]), ENRICHED, opacity=0.15)
     side = case.view.side
     panel.line(time, side * (track.lateral[rows] - base), INK, label="offset towards the lane [m]")
-    panel.level(0.5 * float(track.rows.lane_width[rows[0]]) - 0.5 * track.size.width, dashes="3 2")
+    panel.level(0.5 * float(track.lane_width[rows[0]]) - 0.5 * track.box.width, dashes="3 2")
     panel.x.label, panel.y.label = "time [s]", "offset [m]"
     return figure
 
@@ -114,34 +109,25 @@ def clip_scene(case: Case) -> str | None:
     instants = np.arange(middle - half, middle + half + 1)
     watched = case.view.track
     rows = (instants - watched.first).clip(0, len(watched) - 1)
-    here = watched.rows.x[rows], watched.rows.y[rows]
+    here = watched.x[rows], watched.y[rows]
     tracks = [
         watched,
         *(track for track in case.scene.tracks if track is not watched and _is_near(track, instants, here)),
     ]
     entities = tuple(_motion(track, instants) for track in tracks)
-    motion = NominalMotion(STEP, entities, (), float(len(instants) * STEP), "clip", ())
-    return scene_of(motion, network)
+    return scene_of(Traffic(STEP, entities), network)
 
 
-def _is_near(track: Track, instants: np.ndarray, here: tuple[np.ndarray, np.ndarray]) -> bool:
+def _is_near(track: LaneTrack, instants: np.ndarray, here: tuple[np.ndarray, np.ndarray]) -> bool:
     rows = instants - track.first
     there = (rows >= 0) & (rows < len(track))
-    away = np.hypot(track.rows.x[rows[there]] - here[0][there], track.rows.y[rows[there]] - here[1][there])
+    away = np.hypot(track.x[rows[there]] - here[0][there], track.y[rows[there]] - here[1][there])
     return bool((away < NEAR_DISTANCE).any())
 
 
-def _motion(track: Track, instants: np.ndarray) -> EntityMotion:
+def _motion(track: LaneTrack, instants: np.ndarray) -> EntityMotion:
     rows = instants - track.first
     there = (rows >= 0) & (rows < len(track))
-    rows, c = rows.clip(0, len(track) - 1), track.rows  # c: columns
-    size = track.size
-    box = BoundingBox(size.ahead, 0.0, 0.5 * VEHICLE_HEIGHT, size.length, size.width, VEHICLE_HEIGHT)
-    entity = Entity(name=track.name, category=EntityCategory.VEHICLE, bounding_box=box, place=Place("", 0, ""))
-    none = np.zeros(len(rows))
-    numbers = c.road[rows].astype(np.int32), c.lane[rows].astype(np.int32)
     activity = np.where(there, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
-    return EntityMotion(
-        entity, STEP * (instants - instants[0]), c.x[rows], c.y[rows], none, c.heading[rows], none, none,
-        c.speed[rows], *numbers, c.s[rows], c.offset[rows], none, activity,
-    )  # fmt: skip
+    held = track.at(rows.clip(0, len(track) - 1))
+    return EntityMotion.of(track.entity, STEP * (instants - instants[0]), **{**held.columns, "activity": activity})

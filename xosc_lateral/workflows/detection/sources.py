@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
@@ -21,15 +20,13 @@ from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.detection.tracks import STEP, Rows, Scene, Size, Track, tracks_of
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, in_lanes, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
-from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, place_tracks
+from xosc_lateral.workflows.recordings.recorded import place_tracks
 from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH, read_recording
 from xosc_lateral.workflows.result import given_drives
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion
-from xosc_lateral.world.motion.segments import ACROSS_LANE
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.road.network import RoadNetwork
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -128,45 +125,12 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
         ego = next(iter(chosen_egos(played.scenario, ConvertSettings())), "none")
     elif ego != "none" and ego not in {entity.name for entity in vehicles}:
         raise FormatError(f"has no vehicle {ego!r} to be the ego", path=played.scenario.path)
-    tracks = list[Track]()
+    tracks = list[LaneTrack]()
     for entity in vehicles:
-        box = entity.entity.bounding_box
-        size = Size(box.length, box.width, box.center_x)
-        for rows, cuts in _present(entity, played.network):
-            tracks += tracks_of(entity.name, rows, size, cluster=f"{cluster or name}:{entity.name}", cuts=cuts)
+        there = np.flatnonzero(((entity.activity & Activity.ACTIVE) != 0) & (entity.road >= 0))
+        if len(there) > 1:
+            tracks += tracks_of(in_lanes(entity.at(there), played.network), cluster=f"{cluster or name}:{entity.name}")
     return Scene(name, tuple(tracks), None if ego == "none" else ego, played.network)
-
-
-def _present(motion: EntityMotion, network: RoadNetwork) -> Iterator[tuple[Rows, list[int]]]:
-    """Rows of an entity on roads, and those at which it was placed anew."""
-    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)
-    there = ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
-    rows = np.flatnonzero(there)
-    if len(rows) > 1:
-        road, lane, s = motion.road[rows], motion.lane[rows], motion.s[rows]
-        turned = np.abs(np.sin(motion.heading_relative[rows])) < np.sin(ACROSS_LANE)
-        yield _on_road(
-            network, motion.time[rows], (road, lane, s), motion.offset[rows], motion.speed[rows],
-            (motion.x[rows], motion.y[rows], motion.heading[rows]), turned,
-        ), (np.flatnonzero(np.diff(placed[rows])) + 1).tolist()  # fmt: skip
-
-
-def _on_road(
-    network: RoadNetwork,
-    time: FloatArray,
-    where: tuple[np.ndarray, np.ndarray, np.ndarray],
-    offset: FloatArray,
-    speed: FloatArray,
-    pose: tuple[FloatArray, FloatArray, FloatArray],
-    along: np.ndarray,
-) -> Rows:
-    road, lane, s = where
-    index, count = network.lane_index(road, lane, s)
-    following = along & (index >= 0) & (speed >= MINIMUM_SPEED * (1.0 - 1e-6))
-    indices, counts = index.astype(np.float64), count.astype(np.float64)
-    width, x, y, heading = network.lane_width(road, lane, s), *pose
-    road, lane = road.astype(np.int64), lane.astype(np.int64)
-    return Rows(time, offset, width, speed, indices, counts, following, x, y, heading, road, lane, s)
 
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------
@@ -178,20 +142,12 @@ def _recorded(path: Path, settings: SourceSettings) -> Iterator[Scene]:
     ego = None if settings.ego == "none" else settings.ego
     if ego is not None and ego not in {vehicle.name for vehicle in recording.vehicles}:
         raise FormatError(f"has no vehicle {ego!r} to be the ego", path=path)
-    tracks = list[Track]()
+    tracks = list[LaneTrack]()
     for vehicle in recording.vehicles:
-        size = Size(vehicle.length, vehicle.width, vehicle.centre)
-        tracks += tracks_of(vehicle.name, _rows_of(vehicle, traffic.network), size, cluster=vehicle.name)
+        motion = in_lanes(vehicle, traffic.network)
+        motion = motion.having(following=motion.following & (vehicle.way() > 0))
+        tracks += tracks_of(motion, cluster=vehicle.name)
     yield Scene(traffic.name, tuple(tracks), ego, traffic.network)
-
-
-def _rows_of(vehicle: RecordedVehicle, network: RoadNetwork) -> Rows:
-    step = np.maximum(np.gradient(vehicle.time), 1e-6)
-    vx, vy = np.gradient(vehicle.x) / step, np.gradient(vehicle.y) / step
-    centre = network.lane_to_world(vehicle.road, vehicle.lane, vehicle.s)
-    heading = centre.heading + np.where(vehicle.way < 0, np.pi, 0.0)
-    where, pose = (vehicle.road, vehicle.lane, vehicle.s), (vehicle.x, vehicle.y, heading)
-    return _on_road(network, vehicle.time, where, vehicle.offset, np.hypot(vx, vy), pose, vehicle.way > 0)
 
 
 def drive_scenes(drives: Sequence[Drive]) -> Iterator[Scene]:
@@ -204,14 +160,13 @@ def drive_scenes(drives: Sequence[Drive]) -> Iterator[Scene]:
         truck = context.get("is_truck", nothing)
         kind = "truck" if np.isfinite(truck).any() and np.nanmean(truck) > 0.5 else ""
         length = USUAL_LENGTH.get(kind, 4.6)
-        size = Size(length, USUAL_WIDTH.get(kind, 2.0 * HALF_WIDTH), REAR_AXLE * length)
-        following = np.isnan(speed) | (speed >= MINIMUM_SPEED * (1.0 - 1e-6))
-        none = np.full(n, -1), np.zeros(n, dtype=np.int64), nothing
-        rows = Rows(
-            drive.time, drive.offset, drive.lane_width, speed, index, count, following, nothing, nothing, nothing, *none
-        )
+        car = made_vehicle(drive.name, length, USUAL_WIDTH.get(kind, 2.0 * HALF_WIDTH), REAR_AXLE * length)
+        motion = EntityMotion.of(
+            car, drive.time, offset=drive.offset, lane_width=drive.lane_width, speed=speed, lane_index=index,
+            lane_count=count, following=np.isnan(speed) | (speed >= MINIMUM_SPEED * (1.0 - 1e-6)),
+        )  # fmt: skip
         cuts = [] if drive.run is None else (np.flatnonzero(np.diff(drive.run)) + 1).tolist()
-        tracks = tuple(tracks_of(drive.name, rows, size, cluster=drive.name, cuts=cuts))
+        tracks = tuple(tracks_of(motion, cluster=drive.name, cuts=cuts))
         if tracks:
             yield Scene(drive.name, tracks)
 

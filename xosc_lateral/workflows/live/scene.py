@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.track import KNOWN
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, Traffic
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
@@ -31,8 +32,8 @@ CATEGORY_OF_CLASS = {
 """Vehicle class of SUMO -> category of OpenSCENARIO; a car for the rest. SUMO's ``trailer`` is a truck with one."""
 
 
-MOTION_COLUMNS = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
-"""Of `EntityMotion`, what the rows of a run say."""
+ROW_COLUMNS = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
+"""Columns that the rows of a run say."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +46,15 @@ class Scene:
     is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
 
 
-def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> NominalMotion:
+def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Traffic:
     """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
     times = np.unique(rows["time"])
     index = {name: k for k, name in enumerate(network.road_ids)}
     motions = []
     for entity in scene.entities:
         part = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
-        seen: dict[str, Any] = {name: part[name].to_numpy(dtype=np.float64) for name in MOTION_COLUMNS}
-        seen["road"] = [index.get(str(road), -1) for road in part["road"]]
+        seen: dict[str, Any] = {name: part[name].to_numpy(dtype=np.float64) for name in ROW_COLUMNS}
+        seen["road"] = np.array([index.get(str(road), -1) for road in part["road"]], dtype=np.int32)
         seen["lane"] = part["lane"].to_numpy(dtype=np.int32)
         if scene.is_road:  # a player says inertial places, a motion those of the road's file
             seen["x"], seen["y"] = network.header_offset.undo(seen["x"], seen["y"])
@@ -62,15 +63,17 @@ def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Nominal
         elif len(part):
             there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
             seen |= {"road": there.road, "lane": there.lane, "s": there.s}
-        columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*MOTION_COLUMNS, "heading_relative")}
-        columns |= {name: np.zeros(len(times), dtype=np.int32) for name in ("road", "lane")}
-        columns["activity"] = np.zeros(len(times), dtype=np.uint8)
+        on_road, relative = seen["road"] >= 0, np.zeros(len(part))
+        place = (seen[name][on_road] for name in ("road", "lane", "s"))
+        relative[on_road] = seen["heading"][on_road] - network.lane_to_world(*place).heading
+        seen["heading_relative"] = (relative + np.pi) % (2.0 * np.pi) - np.pi
+        columns = {name: np.zeros(len(times), KNOWN[name].kind) for name in MOTION}
         at = np.searchsorted(times, part["time"])
         for name, values in {**seen, "activity": int(Activity.ACTIVE)}.items():
             columns[name][at] = values
-        motions.append(EntityMotion(entity=entity, time=times, **columns))
+        motions.append(EntityMotion.of(entity, times, **columns))
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
-    return NominalMotion(step, tuple(motions), (), float(times[-1]) if len(times) else 0.0, "simulation", ())
+    return Traffic(step, tuple(motions))
 
 
 def sumo_entity(vehicles: Any, name: str) -> Entity:

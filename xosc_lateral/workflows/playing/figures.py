@@ -107,7 +107,7 @@ def _draw_path(panel: Panel, enriched: Enriched, number: int, road: int) -> None
     breaks = _breaks(motion, rows)[here] | (np.diff(kept, prepend=kept[0] - 1) > 2 * (rows[-1] - rows[0]) / len(rows))
     breaks[0] = False
     color = color_of(number)
-    sign = np.where(np.cos(motion.heading_relative[kept]) >= 0.0, 1.0, -1.0)
+    sign = motion.way(kept)
     nominal, shifted = (
         enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], motion.offset[kept] + added)
         for added in (0.0, sign * entity.deviation[kept])

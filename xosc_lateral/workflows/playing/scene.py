@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.conversion.result import EntityResult
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
 from xosc_lateral.world.road.geometry import simplify
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
@@ -47,7 +47,7 @@ LINE_TOLERANCE = 0.01
 """Lines are simplified to this: less than a tenth of a marking's width. [m]"""
 
 
-def scene_of(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
+def scene_of(motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
     pairs: list[tuple[EntityMotion, EntityResult | None]] = [(result.motion, result) for result in results]
     pairs = pairs or [(entity, None) for entity in motion.entities]
@@ -94,7 +94,7 @@ def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
     return {"r": resolution, "d": np.diff(whole, prepend=0).tolist()}
 
 
-def _rows(motion: NominalMotion, entities: int) -> RowArray:
+def _rows(motion: Traffic, entities: int) -> RowArray:
     count = len(motion.entities[0].time) if motion.entities else 0
     frames = max(1, count * motion.step / FRAME_STEP * entities)
     every = max(1, round(FRAME_STEP / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
@@ -114,8 +114,7 @@ def _entity(
     rows: RowArray,
     origin: FloatArray,
 ) -> dict[str, Any]:
-    box = motion.entity.bounding_box
-    placed = np.cumsum((motion.activity & Activity.TELEPORTED) != 0)[rows]
+    box, shown = motion.box, motion.at(rows)
     values: dict[str, Any] = {
         "name": motion.name,
         "number": number,
@@ -123,15 +122,15 @@ def _entity(
         "width": box.width,
         "ahead": box.center_x,
         "left": box.center_y,
-        "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
-        "jumps": (1 + np.flatnonzero(np.diff(placed))).tolist(),  # frames that nobody reaches by moving
-        "lanes": _lane_changes(network, motion, rows),
-        "course": packed(np.unwrap(_filled(_course(motion)[rows])), HEADING_RESOLUTION),
-        "nominal": _path(motion, rows, origin),
-        "offset": packed(_filled(motion.offset[rows]), POSITION_RESOLUTION),
+        "present": [[part.start, part.stop - 1] for part in true_slices(_present(shown))],
+        "jumps": shown.breaks.tolist(),  # frames that nobody reaches by moving
+        "lanes": _lane_changes(network, shown),
+        "course": packed(np.unwrap(_filled(_course(shown))), HEADING_RESOLUTION),
+        "nominal": _path(shown, origin),
+        "offset": packed(_filled(shown.offset), POSITION_RESOLUTION),
     }
     if result is not None and result.is_enriched:
-        values["enriched"] = _path(result.trajectory, rows, origin)
+        values["enriched"] = _path(result.trajectory.at(rows), origin)
         values["added"] = packed(_filled(result.deviation[rows]), POSITION_RESOLUTION)
     return values
 
@@ -142,12 +141,12 @@ def _course(motion: EntityMotion) -> FloatArray:
     return np.asarray(motion.heading - np.where(motion.road >= 0, turned, 0.0))
 
 
-def _path(path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray) -> dict[str, Any]:
+def _path(path: Track, origin: FloatArray) -> dict[str, Any]:
     return {
-        "x": packed(_filled(path.x[rows] - origin[0]), POSITION_RESOLUTION),
-        "y": packed(_filled(path.y[rows] - origin[1]), POSITION_RESOLUTION),
-        "h": packed(np.unwrap(_filled(path.heading[rows])), HEADING_RESOLUTION),
-        "v": packed(_filled(path.speed[rows]), POSITION_RESOLUTION),
+        "x": packed(_filled(path.x - origin[0]), POSITION_RESOLUTION),
+        "y": packed(_filled(path.y - origin[1]), POSITION_RESOLUTION),
+        "h": packed(np.unwrap(_filled(path.heading)), HEADING_RESOLUTION),
+        "v": packed(_filled(path.speed), POSITION_RESOLUTION),
     }
 
 
@@ -156,10 +155,10 @@ def _filled(values: FloatArray) -> FloatArray:
     return np.nan_to_num(np.asarray(values, dtype=np.float64))
 
 
-def _lane_changes(network: RoadNetwork, motion: EntityMotion, rows: RowArray) -> list[tuple[int, str, int]]:
+def _lane_changes(network: RoadNetwork, motion: EntityMotion) -> list[tuple[int, str, int]]:
     """Frame, road id and lane id wherever one of them is new; no road: off the road."""
-    road, lane = motion.road[rows], motion.lane[rows]
-    is_new = np.append(True, (np.diff(road) != 0) | (np.diff(lane) != 0))[: len(rows)]
+    road, lane = motion.road, motion.lane
+    is_new = np.append(True, (np.diff(road) != 0) | (np.diff(lane) != 0))[: len(motion)]
     return [(int(k), network.road_ids[road[k]] if road[k] >= 0 else "", int(lane[k])) for k in np.flatnonzero(is_new)]
 
 

@@ -76,7 +76,7 @@ def _lane_at(plan: VehiclePlan, time: float, network: RoadNetwork) -> tuple[int,
         return None
     row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
-    return road, lane, network.travel_direction(road, lane) * int(vehicle.way[row])
+    return road, lane, network.travel_direction(road, lane) * int(vehicle.way()[row])
 
 
 def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
@@ -93,13 +93,13 @@ def _beside(
         return None, None
     road, here_lane, way = place
     wanted, at = (road, here_lane if lane is None else lane, way), np.array([time])
-    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, float(plan.speed.at(at)[0])
+    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.box.center_x, float(plan.speed.at(at)[0])
     best: list[Beside | None] = [None, None]
     for other in plans:
         if other is plan or _lane_at(other, time, network) != wanted:
             continue
-        middle = way * float(_along(other, at)[0]) + other.vehicle.centre - here
-        gap = max(abs(middle) - 0.5 * (other.vehicle.length + plan.vehicle.length), 0.0)
+        middle = way * float(_along(other, at)[0]) + other.vehicle.box.center_x - here
+        gap = max(abs(middle) - 0.5 * (other.vehicle.box.length + plan.vehicle.box.length), 0.0)
         k, ahead = (0, 1.0) if middle > 0.0 else (1, -1.0)
         closing, known = (speed - float(other.speed.at(at)[0])) * ahead, best[k]
         if gap <= ENCOUNTER_DISTANCE and (known is None or gap < known.gap):

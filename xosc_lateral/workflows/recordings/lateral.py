@@ -14,7 +14,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course, Rough, lateral_speed
-from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, RecordedVehicle
+from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, own_lateral
+from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.segments import bell_share
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
@@ -79,9 +80,10 @@ class LateralPlan:
         return value
 
 
-def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
+def lateral_plan(vehicle: EntityMotion, begin: float) -> LateralPlan:
     """Find and fit all lateral maneuvers; none starts before `begin` [s]."""
-    course = Course.of(vehicle.time, vehicle.offset, vehicle.lane_width, vehicle.width)
+    side = 0.5 * (vehicle.lane_width - vehicle.box.width)
+    course = Course.across(vehicle.time, *own_lateral(vehicle), np.asarray(side))
     time, y = course.time, course.y
     still_parts = [
         part

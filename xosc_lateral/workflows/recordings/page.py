@@ -6,21 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.workflows.recordings.plan import FRAME, VehiclePlan
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.workflows.recordings.recorded import own_lateral
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.entity import BoundingBox, Entity
-from xosc_lateral.world.scenario.enums import EntityCategory
-from xosc_lateral.world.scenario.place import Place
 
 VEHICLES = {
     "entity": "entity", "recorded_as": "recorded as", "class": "class", "from": "from [s]", "to": "to [s]",
@@ -102,14 +101,13 @@ def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) 
     motions, results = list[EntityMotion](), list[EntityResult]()
     for plan in plans:
         motion = _planned_motion(plan, time, network)
-        across = np.interp(time, plan.vehicle.time, plan.vehicle.offset + plan.vehicle.levels[0])
-        deviation = across - plan.lateral.at(np.clip(time, *plan.present))
+        aside = np.interp(time, plan.vehicle.time, own_lateral(plan.vehicle)[0])
+        deviation = aside - plan.lateral.at(np.clip(time, *plan.present))
         span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
         shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
         motions.append(motion)
         results.append(EntityResult(motion, (), None, "", (shown,), deviation, path))
-    nominal = NominalMotion(FRAME, tuple(motions), (), float(time[-1]), "end of the recording", ())
-    return scene_of(nominal, network, results)
+    return scene_of(Traffic(FRAME, tuple(motions)), network, results)
 
 
 def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:
@@ -123,18 +121,19 @@ def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -
     share = (recorded - vehicle.time[row]) / (vehicle.time[row + 1] - vehicle.time[row])
     same = (vehicle.road[row] == vehicle.road[row + 1]) & (vehicle.lane[row] == vehicle.lane[row + 1])
     s = vehicle.s[row] + np.where(same, share * (vehicle.s[row + 1] - vehicle.s[row]), 0.0)
-    road, lane = vehicle.road[row].astype(np.int32), vehicle.lane[row].astype(np.int32)
-    offset = plan.lateral.at(held) - vehicle.levels[0][row]
-    way_on_lane = vehicle.way[row]
-    poses = network.lane_to_world(road, lane, s, way_on_lane * offset)
+    road, lane = vehicle.road[row], vehicle.lane[row]
+    way_on_lane = vehicle.way(row)
+    offset = way_on_lane * (plan.lateral.at(held) - own_lateral(vehicle)[1][row])
+    poses = network.lane_to_world(road, lane, s, offset)
     speed = plan.speed.at(held)
     is_there = (time >= begin - 1e-9) & (time <= end + FRAME)
     activity = np.where(is_there, Activity.ACTIVE, 0).astype(np.uint8)
     heading = poses.heading + np.where(way_on_lane < 0, np.pi, 0.0)
-    turned = poses.x, poses.y, poses.z, heading, poses.pitch, poses.roll
-    box = BoundingBox(vehicle.centre, 0.0, 0.5 * vehicle.height, vehicle.length, vehicle.width, vehicle.height)
-    entity = Entity(plan.name, EntityCategory.VEHICLE, Place("", 0, ""), box)
-    return EntityMotion(entity, time, *turned, speed, road, lane, s, offset, np.zeros(len(time)), activity)
+    entity = structs.replace(vehicle.entity, name=plan.name)
+    return EntityMotion.of(
+        entity, time, **poses._asdict() | {"heading": heading}, speed=speed, road=road, lane=lane, s=s, offset=offset,
+        heading_relative=np.where(way_on_lane < 0, np.pi, 0.0), activity=activity,
+    )  # fmt: skip
 
 
 def _spread(plans: Sequence[VehiclePlan]) -> Figure:
@@ -153,10 +152,10 @@ def _spread(plans: Sequence[VehiclePlan]) -> Figure:
     return figure
 
 
-def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> WorldTrajectory:
+def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> Track:
     """What was recorded, on the rows of a motion."""
     vehicle = plan.vehicle
     held = np.clip(time, vehicle.time[0], vehicle.time[-1])
     x, y = (np.interp(held, vehicle.time, values) for values in (vehicle.x, vehicle.y))
     speed = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else motion.speed
-    return WorldTrajectory(time, x, y, motion.z, motion.heading, motion.pitch, motion.roll, speed)
+    return motion.having(x=x, y=y, speed=speed)

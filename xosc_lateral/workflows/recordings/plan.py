@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.workflows.recordings.lateral import LateralPlan, Transition, lateral_plan
-from xosc_lateral.workflows.recordings.recorded import RecordedVehicle, Recording
+from xosc_lateral.workflows.recordings.recorded import Recording, own_lateral
+from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class VehiclePlan:
     """One vehicle's part in the scenario."""
 
     name: str  # of the entity
-    vehicle: RecordedVehicle
+    vehicle: EntityMotion
     lateral: LateralPlan
     way: FloatArray  # along the lateral maneuvers' path, at the recorded rows, shape (n,) [m]
     speed: SpeedProfile  # from where it appears to where it leaves
@@ -119,13 +120,15 @@ def entity_names(names: Iterable[str]) -> list[str]:
     return taken
 
 
-def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: float, error: float) -> VehiclePlan:
-    time, (base, _) = vehicle.time, vehicle.levels
+def _plan(name: str, vehicle: EntityMotion, network: RoadNetwork, length: float, error: float) -> VehiclePlan:
+    time, (y, base, _) = vehicle.time, own_lateral(vehicle)
     appears = None if time[0] < FRAME + 1e-9 else float(np.ceil(time[0] / FRAME - 1e-6) * FRAME)
     leaves = None if time[-1] > length - 1.5 * FRAME else float(np.floor(time[-1] / FRAME + 1e-6) * FRAME)
     begin = 0.0 if appears is None else appears
     lateral = _beside_lanes(lateral_plan(vehicle, begin if appears is None else begin + FRAME), vehicle, network)
-    poses = vehicle.poses(network, lateral.at(time) - base)
+    turned = vehicle.way()
+    poses = network.lane_to_world(vehicle.road, vehicle.lane, vehicle.s, turned * (lateral.at(time) - base))
+    poses = poses._replace(heading=poses.heading + np.where(turned < 0, np.pi, 0.0))
     dx, dy = np.diff(poses.x), np.diff(poses.y)
     ahead_of_row = dx * np.cos(poses.heading[1:]) + dy * np.sin(poses.heading[1:])
     way = np.r_[0.0, np.cumsum(np.copysign(np.hypot(dx, dy), ahead_of_row))]  # noise takes back what it moves ahead
@@ -133,7 +136,9 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     speed = fit_speed(time, way, error=share * error, apart=share * CORNER_SPACING)
     ahead = float(speed.way(np.array([begin]))[0])
     road, lane, s = int(vehicle.road[0]), int(vehicle.lane[0]), float(vehicle.s[0])
-    moved = network.advance(road, lane, s, ahead, direction=int(vehicle.way[0]) * network.travel_direction(road, lane))
+    moved = network.advance(
+        road, lane, s, ahead, direction=int(vehicle.way()[0]) * network.travel_direction(road, lane)
+    )
     offset = float(lateral.at(np.array([begin]))[0] - base[0])
     start = moved.road, moved.lane, moved.s, moved.direction if ahead >= 0.0 else -moved.direction, offset
     targets = tuple(_target(vehicle, network, transition) for transition in lateral.transitions)
@@ -143,15 +148,15 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     speed = SpeedProfile(np.r_[begin, speed.time[later]], speeds, ahead)
     present = time >= begin - 1e-9
     moments = time[present]
-    across = (vehicle.offset + base)[present] - lateral.at(moments)
+    aside = y[present] - lateral.at(moments)
     in_lane = np.ones(len(moments), dtype=np.bool_)
     for transition in lateral.transitions:
         in_lane &= (moments < transition.start) | (moments > transition.end)
-    residuals = Residuals(moments, way[present] - speed.way(moments), across, in_lane)
+    residuals = Residuals(moments, way[present] - speed.way(moments), aside, in_lane)
     return VehiclePlan(name, vehicle, lateral, way, speed, appears, leaves, *start, targets, residuals)
 
 
-def _beside_lanes(lateral: LateralPlan, vehicle: RecordedVehicle, network: RoadNetwork) -> LateralPlan:
+def _beside_lanes(lateral: LateralPlan, vehicle: EntityMotion, network: RoadNetwork) -> LateralPlan:
     """With lane changes that begin where the lane that they lead to is there: it may come with the next road."""
     transitions = list[Transition]()
     for transition in lateral.transitions:
@@ -168,13 +173,13 @@ def _beside_lanes(lateral: LateralPlan, vehicle: RecordedVehicle, network: RoadN
     return replace(lateral, transitions=tuple(transitions))
 
 
-def _target(vehicle: RecordedVehicle, network: RoadNetwork, transition: Transition) -> int:
+def _target(vehicle: EntityMotion, network: RoadNetwork, transition: Transition) -> int:
     """Lane that a transition leads to, counted from where it begins: the recorded lane there may be a neighbour."""
-    base, _ = vehicle.levels
+    _, base, _ = own_lateral(vehicle)
     row = min(int(np.searchsorted(vehicle.time, transition.start)), len(base) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
     steps = round(float((transition.level - transition.offset - base[row]) / vehicle.lane_width[row]))
-    side = (1 if steps > 0 else -1) * network.travel_direction(road, lane) * int(vehicle.way[row])
+    side = (1 if steps > 0 else -1) * network.travel_direction(road, lane) * int(vehicle.way()[row])
     for _ in range(abs(steps)):
         lane = lane + side or lane + 2 * side
     return lane

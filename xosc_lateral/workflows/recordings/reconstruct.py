@@ -34,7 +34,7 @@ from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.workflows.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
-from xosc_lateral.workflows.recordings.recorded import Track, place_tracks
+from xosc_lateral.workflows.recordings.recorded import RecordedTrack, place_tracks
 from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
 from xosc_lateral.workflows.recordings.scenario import reconstructed_scenario
 from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
@@ -138,7 +138,7 @@ def _window_model(path: Path, _changed: int) -> WindowModel:
 
 def chosen(
     traffic: RecordedTraffic, settings: ReconstructSettings, host: str | None
-) -> tuple[list[Track], float, float]:
+) -> tuple[list[RecordedTrack], float, float]:
     """Tracks and window of time [s] that the settings ask for."""
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]

@@ -167,7 +167,7 @@ def vehicle_rows(plans: Sequence[VehiclePlan], drivers: Sequence[ChosenDriver]) 
         {
             "entity": plan.name,
             "recorded_as": plan.vehicle.name,
-            "class": plan.vehicle.kind,
+            "class": plan.vehicle.entity.kind,
             "from": round(plan.present[0], 3),
             "to": round(plan.present[1], 3),
             "corners": len(plan.speed.time) - 2,

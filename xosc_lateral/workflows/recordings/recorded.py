@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.lane_changes import lane_levels
+from xosc_lateral.base.track import lane_levels
+from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.positions import Poses
 
 MARKING_TOLERANCE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
 LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in `recordings.cuts` [s]
@@ -27,65 +27,22 @@ HEADING_WINDOW = 2.0  # way over which a heading is averaged, so that positions'
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class RecordedVehicle:
-    """One passage of one vehicle; arrays of shape (n,), rows in order of time."""
-
-    name: str  # name, kind: as recorded; the class in lower case, empty where not known
-    kind: str
-    length: float  # length, width, height: [m]
-    width: float
-    height: float
-    centre: float  # middle of the vehicle ahead of its reference point, the rear axle [m]
-    time: FloatArray  # [s]
-    x: FloatArray  # x, y: of the reference point, in the coordinates of the road [m]
-    y: FloatArray
-    road: IntArray  # road, lane: index of the road in the network, OpenDRIVE lane
-    lane: IntArray
-    # s, offset, lane_width: offset from the lane's centre, positive to the LEFT of the vehicle's travel [m]
-    s: FloatArray
-    offset: FloatArray
-    lane_width: FloatArray
-    # way: +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way
-    way: IntArray
-
-    def poses(self, network: RoadNetwork, offset: FloatArray) -> Poses:
-        """World poses at each row's place along the road, `offset` [m] to the left of its lane's centre; shape (n,)."""
-        poses = network.lane_to_world(self.road, self.lane, self.s, self.way * offset)
-        return poses._replace(heading=poses.heading + np.where(self.way < 0, np.pi, 0.0))
-
-    @property
-    def levels(self) -> tuple[FloatArray, IntArray]:
-        """See `lane_levels`."""
-        return lane_levels(self.offset, self.lane_width)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class Recording:
     """Vehicles on a road, and what was left out, a line each."""
 
-    vehicles: tuple[RecordedVehicle, ...]
+    vehicles: tuple[EntityMotion, ...]  # one passage each, in the lanes of the road; their headings are their lanes'
     left_out: tuple[str, ...]
     start: float  # start, end: of the window [s]
     end: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Track:
-    """One vehicle as recorded, in the coordinates of the road; arrays of shape (n,)."""
+class RecordedTrack(EntityMotion):
+    """One vehicle as recorded, in the coordinates of the road: x, y and heading of the recorded point."""
 
-    name: str
-    kind: str
-    length: float  # length, width, height: [m]
-    width: float
-    height: float
-    ahead: float  # the recorded point ahead of the reference point [m]
-    middle: float  # the vehicle's middle ahead of it [m]
-    time: FloatArray  # time, x, y, heading: of the recorded point [s], [m], [rad]
-    x: FloatArray
-    y: FloatArray
-    heading: FloatArray
+    ahead: float  # that point ahead of the reference point [m]
 
-    def distance(self, other: Track, begin: float, end: float) -> float:
+    def distance(self, other: RecordedTrack, begin: float, end: float) -> float:
         """The least to another track between two moments [s]; infinite where they are not there at once. [m]"""
         first, last = max(begin, self.time[0]), min(end, self.time[-1])
         time = other.time[(other.time >= first) & (other.time <= last)]
@@ -96,24 +53,35 @@ class Track:
         return float(np.hypot(x, y).min(initial=np.inf))
 
 
-def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
+def own_lateral(vehicle: EntityMotion) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Lateral position, that of each row's lane centre, both from the first row's lane centre and positive to the LEFT
+    of the vehicle's own travel [m], and how many lanes to that side; shape (n,).
+    """
+    aside = vehicle.way() * vehicle.offset
+    base, lanes = lane_levels(aside, vehicle.lane_width)
+    return aside + base, base, lanes
+
+
+def place_tracks(tracks: Sequence[RecordedTrack], network: RoadNetwork, start: float, end: float) -> Recording:
     """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
-    vehicles, left_out = list[RecordedVehicle](), list[str]()
+    vehicles, left_out = list[EntityMotion](), list[str]()
     for track in tracks:
         inside = (np.hypot(track.x, track.y) < MAXIMUM_COORDINATE) & np.isfinite(track.heading)
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
         if len(rows):
             rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
-            vehicle = _place(track, rows, network, left_out)
+            vehicle = _place(track, rows, network, left_out, start)
             if vehicle is not None:
-                vehicles.append(replace(vehicle, time=vehicle.time - start))
+                vehicles.append(vehicle)
     if not vehicles:
         why = f": {left_out[0]}" if left_out else ""
         raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
     return Recording(tuple(vehicles), tuple(left_out), start, end)
 
 
-def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str]) -> RecordedVehicle | None:
+def _place(
+    track: RecordedTrack, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str], start: float
+) -> EntityMotion | None:
     time, x, y = track.time[rows], track.x[rows], track.y[rows]
     velocity = np.stack([_slope(time, x), _slope(time, y)])
     heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
@@ -144,10 +112,13 @@ def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out:
         reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
         counts = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
         left_out.append(f"{track.name}: {lost} of {len(time)} rows: {counts}")
-    vehicle = track.name, track.kind, track.length, track.width, track.height, track.middle
-    road, lane, way = (each.astype(np.int64)[best] for each in (nearest.road, nearest.lane, way))
-    where = road, lane, nearest.s[best], way * nearest.offset[best], width[best], way
-    return RecordedVehicle(*vehicle, time[best], x[best], y[best], *where)
+    moments, x, y, turned = time[best] - start, x[best], y[best], np.where(way[best] < 0, np.pi, 0.0)
+    step = np.maximum(np.gradient(moments), 1e-6)
+    return EntityMotion.of(
+        track.entity, moments, x=x, y=y, heading=lane_heading[best] + turned, heading_relative=turned,
+        speed=np.hypot(np.gradient(x) / step, np.gradient(y) / step), road=nearest.road[best], lane=nearest.lane[best],
+        s=nearest.s[best], offset=nearest.offset[best], lane_width=width[best],
+    )  # fmt: skip
 
 
 def _slope(time: FloatArray, values: FloatArray) -> FloatArray:

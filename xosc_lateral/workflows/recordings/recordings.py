@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import FormatError
@@ -23,8 +24,9 @@ from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_o
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.importers.tracks import LaneShape
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph
-from xosc_lateral.workflows.recordings.recorded import Track
+from xosc_lateral.workflows.recordings.recorded import RecordedTrack
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
+from xosc_lateral.world.motion.nominal import made_vehicle
 from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.1  # rows are thinned to this: lane changes and braking last seconds [s]
@@ -44,7 +46,7 @@ class RecordedTraffic:
     """Tracks in the coordinates of a road."""
 
     name: str  # of what is made from it
-    tracks: tuple[Track, ...]
+    tracks: tuple[RecordedTrack, ...]
     network: RoadNetwork
     road: bytes  # the road's file
     road_name: str  # of the file
@@ -69,7 +71,11 @@ def read_recording(
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
         traffic = READERS[kind](source, road, as_mapping(columns))
-    tracks = tuple(replace(track, name=composed(track.name)) for track in traffic.tracks)
+    names = (composed(track.name) for track in traffic.tracks)
+    tracks = tuple(
+        replace(track, name=name, entity=structs.replace(track.entity, name=name))
+        for track, name in zip(traffic.tracks, names, strict=True)
+    )
     return replace(traffic, tracks=tracks, host=composed(traffic.host))
 
 
@@ -146,9 +152,9 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     return RecordedTraffic(name_of(source), vehicles, network, data, road_name, sources, notes)
 
 
-def _vehicles(tracks: Tracks) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+def _vehicles(tracks: Tracks) -> tuple[tuple[RecordedTrack, ...], tuple[str, ...]]:
     """Each vehicle, its rows `STEP` apart or as recorded, the first and the last always; and whose size is none."""
-    vehicles, notes = list[Track](), list[str]()
+    vehicles, notes = list[RecordedTrack](), list[str]()
     parts = np.split(np.arange(len(tracks.x)), np.flatnonzero(np.diff(tracks.vehicle)) + 1)
     for name, part in zip(tracks.names, parts, strict=True):
         number = np.floor((tracks.time[part] - tracks.time[part[0]]) / STEP + 1e-6)
@@ -169,7 +175,9 @@ def _vehicles(tracks: Tracks) -> tuple[tuple[Track, ...], tuple[str, ...]]:
         height = USUAL_HEIGHT.get(kind, 1.5) if tracks.height is None else float(tracks.height[first])
         middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[first])
         ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
-        vehicles.append(Track(name, kind, length, width, height, ahead, middle, time, x, y, heading))
+        columns = {"x": x, "y": y, "heading": heading}
+        entity = made_vehicle(name, length, width, middle, height, kind)
+        vehicles.append(RecordedTrack(name, time, columns, np.empty(0, dtype=np.intp), entity, ahead))
     return tuple(vehicles), tuple(notes)
 
 

@@ -120,14 +120,15 @@ class _Vehicle:
 
     def add_entity(self, entities: etree._Element, *, is_host: bool) -> None:
         """As large as it was measured."""
-        recorded, kind = self._plan.vehicle, MODELS.get(self._plan.vehicle.kind, "car")
+        recorded, box = self._plan.vehicle, self._plan.vehicle.box
+        kind = MODELS.get(recorded.entity.kind, "car")
         vehicle = sub(sub(entities, "ScenarioObject", name=self._plan.name), "Vehicle", name=kind, vehicleCategory=kind)
-        width, length, height = (decimal(size, 3) for size in (recorded.width, recorded.length, recorded.height))
-        sub(vehicle, "BoundingBox/Center", x=decimal(recorded.centre, 3), y="0", z=decimal(0.5 * recorded.height, 3))
+        width, length, height = (decimal(size, 3) for size in (box.width, box.length, box.height))
+        sub(vehicle, "BoundingBox/Center", x=decimal(box.center_x, 3), y="0", z=decimal(0.5 * box.height, 3))
         sub(vehicle[0], "Dimensions", width=width, length=length, height=height)
         sub(vehicle, "Performance", **LIMITS)
         axles = sub(vehicle, "Axles")
-        track, front = decimal(0.85 * recorded.width, 3), decimal(2.0 * recorded.centre, 3)
+        track, front = decimal(0.85 * box.width, 3), decimal(2.0 * box.center_x, 3)
         for tag, steering, x in (("FrontAxle", "0.5", front), ("RearAxle", "0", "0")):
             sub(axles, tag, maxSteering=steering, wheelDiameter="0.7", trackWidth=track, positionX=x, positionZ="0.35")
         properties = sub(vehicle, "Properties")

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import BLOCK, stored
+from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import stretches_within
 
@@ -38,18 +38,6 @@ PAIRS_PER_CALL = 256
 """Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
 
 
-class BoxPath(Struct, frozen=True, eq=False):
-    """A vehicle's bounding box along its path."""
-
-    name: str
-    x: FloatArray
-    y: FloatArray
-    heading: FloatArray  # x to heading: of the reference point, shape (n,); NaN where absent [m], [rad]
-    length: float
-    width: float  # length, width: of the box [m]
-    centre: float  # box centre ahead of the reference point [m]
-
-
 class Gap(Struct, frozen=True):
     """Smallest free space between two vehicles over a run; 0: they touch."""
 
@@ -63,24 +51,23 @@ class Gap(Struct, frozen=True):
         return self.distance <= 0.0
 
 
-def gaps_of(motion: NominalMotion, paths: Sequence[WorldTrajectory | EntityMotion]) -> tuple[Gap, ...]:
+def gaps_of(motion: NominalMotion, paths: Sequence[Track]) -> tuple[Gap, ...]:
     """Smallest gap of each pair of vehicles of a run that meet; `paths`: one per entity."""
-    every = max(1, round(GAP_STEP / motion.step))
+    every = slice(None, None, max(1, round(GAP_STEP / motion.step)))
     vehicles = [both for both in zip(motion.entities, paths, strict=True) if both[0].entity.is_vehicle]
     if len(vehicles) < 2:
         return ()
     boxes = []
     for entity, path in vehicles:
-        box = entity.entity.bounding_box
-        absent = (entity.activity[::every] & Activity.ACTIVE) == 0
-        x = np.where(absent, np.nan, path.x[::every])
-        x, y, heading = (stored(values) for values in (x, path.y[::every], path.heading[::every]))
-        boxes.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
-    return smallest_gaps(motion.entities[0].time[::every], boxes)
+        absent = (entity.activity[every] & Activity.ACTIVE) == 0
+        x = np.where(absent, np.nan, path.x[every])
+        x, y, heading = (stored(values) for values in (x, path.y[every], path.heading[every]))
+        boxes.append(EntityMotion.of(entity.entity, entity.time[every], x=x, y=y, heading=heading))
+    return smallest_gaps(boxes)
 
 
-def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath]) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles that come within `MAXIMUM_GAP` of each other, on one time grid [s]."""
+def smallest_gaps(paths: Sequence[EntityMotion]) -> tuple[Gap, ...]:
+    """Smallest gap of each pair that comes within `MAXIMUM_GAP` of each other, on one time grid; x is NaN: absent."""
     smallest: dict[tuple[int, int], Gap] = {}
     for part in _together(_near_pairs(paths)):
         a, b = ([(paths[pair[side]], near) for pair, near in part] for side in (0, 1))
@@ -90,27 +77,28 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath]) -> tuple[Gap, ...]
             best = int(np.argmin(distance))
             if distance[best] <= MAXIMUM_GAP and not (pair in smallest and smallest[pair].distance <= distance[best]):
                 names = paths[pair[0]].name, paths[pair[1]].name
-                smallest[pair] = Gap(names, float(distance[best]), float(time[near[best]]))
+                smallest[pair] = Gap(names, float(distance[best]), float(paths[0].time[near[best]]))
     return tuple(smallest[pair] for pair in sorted(smallest))
 
 
 _NearPair = tuple[tuple[int, int], NDArray[np.intp]]
 
 
-def _near_pairs(paths: Sequence[BoxPath]) -> Iterator[_NearPair]:
+def _near_pairs(paths: Sequence[EntityMotion]) -> Iterator[_NearPair]:
     """Pairs that come near each other, and rows of a stretch on which their gap may be the smallest."""
-    extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
+    boxes = [path.box for path in paths]
+    extent = max((np.hypot(box.length, box.width) / 2 + abs(box.center_x) for box in boxes), default=0.0)
     x, y = [path.x for path in paths], [path.y for path in paths]
     for rows, pairs in stretches_within(x, y, MAXIMUM_GAP + 2 * extent):
         for first, second in pairs:
-            a, b = paths[first], paths[second]
+            a, b = boxes[first], boxes[second]
             half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
-            between = np.hypot(a.x[rows] - b.x[rows], a.y[rows] - b.y[rows])
-            apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
+            between = np.hypot(x[first][rows] - x[second][rows], y[first][rows] - y[second][rows])
+            apart = between - half_diagonals - abs(a.center_x) - abs(b.center_x)
             near = np.flatnonzero(apart <= MAXIMUM_GAP)
             if len(near):
                 # the exact distance is only needed where a lower bound of it undercuts the best upper bound
-                upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
+                upper = np.min(between[near]) + abs(a.center_x) + abs(b.center_x)
                 yield (first, second), rows.start + near[apart[near] <= upper]
 
 
@@ -128,18 +116,18 @@ def _together(pairs: Iterator[_NearPair]) -> Iterator[list[_NearPair]]:
         yield part
 
 
-def corners(boxes: Sequence[tuple[BoxPath, NDArray[np.intp]]]) -> FloatArray:
+def corners(boxes: Sequence[tuple[EntityMotion, NDArray[np.intp]]]) -> FloatArray:
     """Corners of boxes on some rows each, counter-clockwise, one box after the other, shape (n, 4, 2). [m]"""
-    x, y, heading = (np.concatenate([getattr(box, name)[rows] for box, rows in boxes])[:, None] for name in _POSE)
+    x, y, heading = (np.concatenate([one.columns[name][rows] for one, rows in boxes])[:, None] for name in _POSE)
     counts = [len(rows) for _, rows in boxes]
-    length, width, centre = (np.repeat([getattr(box, name) for box, _ in boxes], counts)[:, None] for name in _SIZE)
+    length, width, centre = (np.repeat([getattr(one.box, name) for one, _ in boxes], counts)[:, None] for name in _SIZE)
     ahead = centre + 0.5 * length * np.array([1.0, -1.0, -1.0, 1.0])
     left = 0.5 * width * np.array([1.0, 1.0, -1.0, -1.0])
     cos, sin = np.cos(heading), np.sin(heading)
     return np.stack([x + ahead * cos - left * sin, y + ahead * sin + left * cos], axis=-1)
 
 
-_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
+_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "center_x")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -187,15 +175,13 @@ class RoadPath:
     centre: float  # box centre ahead of the reference point [m]
 
 
-def road_path(
-    motion: EntityMotion, network: RoadNetwork, path: WorldTrajectory | EntityMotion, deviation: FloatArray | float
-) -> RoadPath:
+def road_path(motion: EntityMotion, network: RoadNetwork, path: Track, deviation: FloatArray | float) -> RoadPath:
     """Way of a vehicle that drives a path beside its nominal motion, `deviation` to the left. [m]"""
     box = motion.entity.bounding_box
     every = max(1, round(GAP_STEP / (motion.time[1] - motion.time[0]))) if len(motion.time) > 1 else 1
     road, lane, s = motion.road[::every], motion.lane[::every], motion.s[::every]
     present = (motion.activity[::every] & Activity.ACTIVE) != 0
-    along = np.where(np.cos(motion.heading_relative[::every]) >= 0.0, 1, -1)
+    along = motion.way(slice(None, None, every))
     offset = motion.offset[::every] + along * np.broadcast_to(deviation, len(motion.time))[::every]
     t, forward = np.full(len(s), np.nan), np.ones(len(s), dtype=np.int_)
     on_road = road >= 0

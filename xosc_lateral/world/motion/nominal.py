@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, Int32Array
+from xosc_lateral.base.arrays import FloatArray, IndexArray
 from xosc_lateral.base.errors import locate
-from xosc_lateral.world.scenario.entity import Entity
+from xosc_lateral.base.rows import rows_where
+from xosc_lateral.base.track import Track
+from xosc_lateral.world.scenario.entity import BoundingBox, Entity
+from xosc_lateral.world.scenario.enums import EntityCategory
+from xosc_lateral.world.scenario.place import Place
 
 
 def axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -45,30 +49,54 @@ class Activity(IntFlag):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class EntityMotion:
-    """One entity's rows, one per step, from time 0 to the end; arrays of shape (n,)."""
+class EntityMotion(Track):
+    """An entity over time; a played one has all columns of `MOTION`, one row per step, from time 0 to the end."""
 
     entity: Entity  # name, category, bounding box, performance
-    time: FloatArray  # [s] from scenario start, uniform
-    x: FloatArray
-    y: FloatArray
-    z: FloatArray
-    heading: FloatArray
-    pitch: FloatArray
-    roll: FloatArray  # x to roll: pose of the reference point (rear axle) [m], [rad]
-    speed: FloatArray  # signed scalar speed [m/s]
-    road: Int32Array  # index into `RoadNetwork.road_ids`; -1 where the entity is on no road
-    lane: Int32Array  # OpenDRIVE lane id; 0 where on no road
-    s: FloatArray  # along the road's reference line [m]
-    offset: FloatArray  # from the centre of `lane`, positive to the LEFT of the lane's direction of travel [m]
-    heading_relative: FloatArray
-    """Turn from the lane's direction of travel, about the normal of the road's surface. [rad]"""
-    activity: NDArray[np.uint8]  # `Activity` bits
+
+    @classmethod
+    def of(cls, entity: Entity, time: FloatArray, **columns: NDArray[Any]) -> Self:
+        """Its breaks are the rows in which it is placed anew."""
+        return cls(entity.name, time, columns, placed_anew(columns.get("activity")), entity)
+
+    def way(self, rows: slice | IndexArray = slice(None)) -> NDArray[np.int64]:
+        """1: it drives as its lane is driven; -1: against it, as who overtakes on a road with one lane each way."""
+        return np.where(np.cos(self.heading_relative[rows]) >= 0.0, 1, -1)
 
     @property
-    def name(self) -> str:
-        """The entity's name in the scenario."""
-        return self.entity.name
+    def box(self) -> BoundingBox:
+        """The entity's."""
+        return self.entity.bounding_box
+
+    def having(self, **columns: NDArray[Any]) -> Self:
+        """With these columns, in place of its own of those names; the breaks are those of its activity."""
+        breaks = placed_anew(columns["activity"]) if "activity" in columns else self.breaks
+        return replace(self, columns={**self.columns, **columns}, breaks=breaks)
+
+
+def placed_anew(activity: NDArray[np.uint8] | None) -> IndexArray:
+    """Rows, from 1 on, into which nobody moves from the one before."""
+    if activity is None:
+        return np.empty(0, dtype=np.intp)
+    return rows_where(len(activity), lambda rows: (activity[rows] & np.uint8(Activity.TELEPORTED)) != 0, 1)
+
+
+USUAL_HEIGHT = 1.5
+"""Of a vehicle that is seen from above. [m]"""
+
+
+def made_vehicle(
+    name: str, length: float, width: float, ahead: float, height: float = USUAL_HEIGHT, kind: str = ""
+) -> Entity:
+    """One from no file; `ahead`: its middle before the reference point, the rear axle. [m]"""
+    box = BoundingBox(ahead, 0.0, 0.5 * height, length, width, height)
+    return Entity(name, EntityCategory.VEHICLE, Place("", 0, ""), box, kind=kind)
+
+
+POSE = ("x", "y", "z", "heading", "pitch", "roll", "speed")
+"""Columns of a path."""
+MOTION = (*POSE, "road", "lane", "s", "offset", "heading_relative", "activity")
+"""Columns of what is played, in the recorder's order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +129,18 @@ CUT_OFF = "still runs at the time limit"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class NominalMotion:
-    """A played scenario."""
+class Traffic:
+    """Whatever moves, on one clock: played, recorded, or run by somebody else."""
 
     step: float  # [s]
     entities: tuple[EntityMotion, ...]  # in the scenario's order
-    actions: tuple[PlayedAction, ...]  # every action started, in order of start
+    actions: tuple[PlayedAction, ...] = ()  # every action started, in order of start
+
+
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class NominalMotion(Traffic):
+    """A played scenario."""
+
     end_time: float  # [s]
     ended_by: str  # ``"stop trigger"`` or ``"time limit"`` or what else ended the run
     notes: tuple[Note, ...]  # what could not be played as written

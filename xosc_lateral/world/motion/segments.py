@@ -223,7 +223,7 @@ def bell_share(u: FloatArray) -> FloatArray:
 def _way(entity: EntityMotion, first: int, last: int) -> FloatArray:
     """From the first row on, over lanes: where the lane changes under the vehicle, it goes on as before and after."""
     rows = slice(first, last + 1)
-    along = np.where(np.cos(entity.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+    along = entity.way(rows)
     steps = along[1:] * np.diff(entity.offset[rows])
     same = (np.diff(entity.lane[rows]) == 0) & (np.diff(entity.road[rows]) == 0)
     known = np.flatnonzero(same)

@@ -14,7 +14,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +21,8 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import blocks, columns, empty, put, rows_where, scratch
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.base.track import Track
+from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
 _STANDSTILL = 1e-3
@@ -33,20 +33,6 @@ _LEAP_DISTANCE = 0.3
 
 _MAXIMUM_LATERAL_SPEED = 10.0
 """No lateral action is faster. [m/s]"""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class WorldTrajectory:
-    """A path in the world over time, on the rows of the nominal motion; arrays of shape (n,)."""
-
-    time: FloatArray  # [s]
-    x: FloatArray
-    y: FloatArray
-    z: FloatArray  # x, y, z [m]
-    heading: FloatArray
-    pitch: FloatArray
-    roll: FloatArray  # heading, pitch, roll [rad]
-    speed: FloatArray  # along the path, negative when driving backwards [m/s]
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
@@ -80,14 +66,18 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
     return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in leaping]
 
 
-def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
-    """Shift motion to its left by a deviation [m], where it is on a road; headings and speeds follow from the path."""
+def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Track:
+    """The path to the left of a motion by a deviation [m], where it is on a road; headings and speeds follow from it.
+
+    It has the columns of `POSE` alone: those of the place are the motion's.
+    """
     n = len(motion.time)
     x, y, z = columns(n, _shifted(motion, network, deviation)) if n else (motion.x, motion.y, motion.z)
     heading, speed = motion.heading, motion.speed
     if any(_moves(motion, deviation, rows).any() for rows in blocks(n)):
         heading, speed = _turned_and_longer(motion, x, y)
-    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, speed)
+    pose = {name: motion.columns[name] for name in POSE} | {"x": x, "y": y, "z": z, "heading": heading, "speed": speed}
+    return Track(motion.name, motion.time, pose, motion.breaks)
 
 
 def _moves(motion: EntityMotion, deviation: FloatArray, rows: slice) -> BoolArray:
@@ -102,7 +92,7 @@ def _shifted(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
         if len(moved):
             rows = moved + part.start
             # a vehicle that meets its lane's traffic head-on has its left on the lane's right
-            along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+            along_lane = motion.way(rows)
             road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
             points = network.lane_points(road, lane, s, nominal, nominal + along_lane * deviation[rows])
             # the nominal pose is kept to the bit and only the difference added, so that none changes nothing
@@ -125,8 +115,7 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
     times the ratio of path lengths, which stays right at a speed step.
     """
     heading, speed = empty(len(x)), empty(len(x))
-    placed_anew = rows_where(len(x), lambda rows: (motion.activity[rows] & Activity.TELEPORTED) != 0)
-    for piece in (slice(a, b) for a, b in pairwise(sorted({0, *placed_anew.tolist(), len(x)}))):
+    for piece in (slice(a, b) for a, b in pairwise([0, *motion.breaks.tolist(), len(x)])):
         if piece.stop - piece.start < 2:
             put(heading, piece, motion.heading[piece] + 0.0)
             put(speed, piece, motion.speed[piece])

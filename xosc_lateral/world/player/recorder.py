@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.base.errors import FormatError, PlaybackError
 from xosc_lateral.base.rows import BLOCK, columns, stored
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.road.tables import turned_in_surface
@@ -113,10 +113,11 @@ class Rows:
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel; what was written down is gone."""
         self.put_away()
-        return EntityMotion(self.state.entity, time, *columns(len(time), self._worked_out(network, time)))
+        worked_out = columns(len(time), self._worked_out(network, time))
+        return EntityMotion.of(self.state.entity, time, **dict(zip(MOTION, worked_out, strict=True)))
 
     def _worked_out(self, network: RoadNetwork, time: FloatArray) -> Iterator[tuple[NDArray[Any], ...]]:
-        """Columns of `EntityMotion` from x on, in blocks of rows."""
+        """The columns of `MOTION`, in blocks of rows."""
         begin, before = 0, tuple[NDArray[Any], ...]()
         for s, offset, along, speed, road, lane, activity in self._blocks():
             n, where = len(s), _Where(road, lane, s, offset)

@@ -95,7 +95,7 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     on = entity.road[grid] >= 0
     rows = grid[on]
     # Against the lane's traffic all is seen the other way round.
-    along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
+    along = entity.way(rows).astype(np.float64)
     values = road_columns(network, entity.road[rows], entity.lane[rows], entity.s[rows], entity.offset[rows], along)
     return {name: spread_out(part, on) for name, part in values.items()}
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
@@ -20,7 +21,6 @@ from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import OffsetChain
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.scenario import Scenario
 
@@ -28,7 +28,7 @@ from xosc_lateral.world.scenario.scenario import Scenario
 def write_converted(
     scenario: Scenario,
     motion: NominalMotion,
-    trajectories: Mapping[str, WorldTrajectory],
+    trajectories: Mapping[str, Track],
     output: Path | str,
     *,
     chains: Sequence[OffsetChain] | None = None,

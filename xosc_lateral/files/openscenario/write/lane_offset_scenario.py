@@ -18,6 +18,7 @@ import numpy as np
 from lxml import etree
 from msgspec import Struct
 
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
@@ -25,7 +26,6 @@ from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import REST_TIME, Move, OffsetChain, OffsetPath, Ring
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, gives_lateral
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
@@ -53,7 +53,7 @@ def add_lane_offsets(
     draft: Draft,
     chains: Sequence[OffsetChain],
     lateral: LateralActions,
-    trajectories: Mapping[str, WorldTrajectory],
+    trajectories: Mapping[str, Track],
 ) -> tuple[str, ...]:
     """Add lane offset actions to maneuvers that stay as they are; who has them or follows a trajectory instead."""
     moving = moving_entities(draft, trajectories)

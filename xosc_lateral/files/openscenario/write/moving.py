@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,11 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import blocks, columns, stored
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import ColumnsOf, Pose, TimedVertices
 from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.path_pieces import (
     LEAST_SPACING,
     VERTEX_SPACING,
@@ -23,7 +23,6 @@ from xosc_lateral.world.motion.path_pieces import (
     cut_path,
     vertex_times,
 )
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.enums import Priority
 
 MOTION_SINCE = (1, 4)
@@ -36,7 +35,7 @@ CATCH_UP_RATIO = 20.0
 class Moving:
     """An entity with its path cut into pieces."""
 
-    def __init__(self, entity: EntityMotion, path: WorldTrajectory, motion: NominalMotion) -> None:
+    def __init__(self, entity: EntityMotion, path: Track, motion: NominalMotion) -> None:
         self.name, self.end = entity.name, motion.end_time
         _check(entity, path)
         self.active_at_start = bool(entity.activity[0] & Activity.ACTIVE)
@@ -73,7 +72,7 @@ class Moving:
         return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
 
-def moving_entities(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> dict[str, Moving]:
+def moving_entities(draft: Draft, trajectories: Mapping[str, Track]) -> dict[str, Moving]:
     """Entities that follow trajectories, in the order of the run; mirrored where the scenario is left-handed."""
     paths = {}
     for entity in draft.motion.entities:
@@ -84,14 +83,14 @@ def moving_entities(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -
     return paths
 
 
-def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
+def _mirrored(path: Track) -> Track:
     """In the left-handed coordinates of a scenario written for CARLA."""
     n, turned = len(path.time), (path.y, path.heading, path.pitch)
     y, heading, pitch = columns(n, ([-values[rows] for values in turned] for rows in blocks(n)))
-    return replace(path, y=y, heading=heading, pitch=pitch)
+    return path.having(y=y, heading=heading, pitch=pitch)
 
 
-def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tuple[WorldTrajectory, list[PathPiece]]:
+def _stopping_in_time(path: Track, pieces: Sequence[PathPiece]) -> tuple[Track, list[PathPiece]]:
     """Sudden stops whose last step is too short for a vertex of its own: it would slow the one before.
 
     A car that runs at 20 m/s into the end of its road covers the last of it in a part of a step. It is there a step
@@ -103,35 +102,35 @@ def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tup
         return path, list(pieces)
     names, n = ("x", "y", "z", "heading", "pitch", "roll"), len(path.time)
     arrays = dict(
-        zip(names, columns(n, ([getattr(path, name)[r].copy() for name in names] for r in blocks(n))), strict=True)
+        zip(names, columns(n, ([path.columns[name][r].copy() for name in names] for r in blocks(n))), strict=True)
     )
     for row in (piece.last - 1 for piece in early):
         for name in names:
             if arrays[name].flags.writeable:  # else all are the same
-                arrays[name][row] = getattr(path, name)[row + 1]
+                arrays[name][row] = path.columns[name][row + 1]
     for last in (piece.last for piece in sudden - early):
         share = (VERTEX_SPACING - _way(path, last)) / _way(path, last - 1)
         for name in ("x", "y", "z"):
             if arrays[name].flags.writeable:
                 arrays[name][last - 1] += share * (arrays[name][last - 2] - arrays[name][last - 1])
     ends = [structs.replace(piece, last=piece.last - 1, stops=True) if piece in early else piece for piece in pieces]
-    return replace(path, **arrays), ends
+    return path.having(**arrays), ends
 
 
-def _is_sudden(path: WorldTrajectory, piece: PathPiece) -> bool:
+def _is_sudden(path: Track, piece: PathPiece) -> bool:
     final, before = _way(path, piece.last), _way(path, piece.last - 1)
     stops = piece.stops or (piece.last == len(path.time) - 1 and final < 0.5 * before)
     return stops and final < LEAST_SPACING < before
 
 
-def _way(path: WorldTrajectory, row: int) -> float:
+def _way(path: Track, row: int) -> float:
     """Of the step to a row. [m]"""
     return float(np.hypot(path.x[row] - path.x[row - 1], path.y[row] - path.y[row - 1]))
 
 
-def _check(entity: EntityMotion, path: WorldTrajectory) -> None:
-    arrays = (path.time, path.x, path.y, path.z, path.heading, path.pitch, path.roll)
-    if any(len(values) != len(entity.time) for values in arrays):
+def _check(entity: EntityMotion, path: Track) -> None:
+    arrays = [path.columns[name] for name in POSE]
+    if len(path) != len(entity):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
     for rows in blocks(len(entity.time)):
         away = (entity.activity[rows] & Activity.ACTIVE) == 0
@@ -173,7 +172,7 @@ def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, d
     build.time_trigger(event, "StartTrigger", start, draft.version)
 
 
-def _columns_of(path: WorldTrajectory, rows: slice, times: FloatArray, version: build.Version) -> ColumnsOf:
+def _columns_of(path: Track, rows: slice, times: FloatArray, version: build.Version) -> ColumnsOf:
     """Columns of the vertices at some times, which have the headings of a little later."""
     time, speed, heading = path.time[rows], path.speed[rows], _unwrapped(path.heading[rows])
     arrays = [values[rows] for values in (path.x, path.y, path.z, path.pitch, path.roll)]

@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from lxml import etree
 
+from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.element import at_node, child_of, children_of, elements, local_name
 from xosc_lateral.files.openscenario.references import NAMES, final
 from xosc_lateral.files.openscenario.storyboard import GROUPING
@@ -18,7 +19,6 @@ from xosc_lateral.files.openscenario.write.moving import Moving, add_trajectorie
 from xosc_lateral.files.openscenario.write.versions import newer_than
 from xosc_lateral.files.xml import parse_xml
 from xosc_lateral.world.motion.nominal import NominalMotion, PlayedAction
-from xosc_lateral.world.motion.trajectory import WorldTrajectory
 from xosc_lateral.world.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.world.scenario.controllers import assigned_controllers, controlled_entities, named
 from xosc_lateral.world.scenario.enums import Priority
@@ -163,7 +163,7 @@ STOP_TRIGGER = "stop trigger"
 """`NominalMotion.ended_by` of a run that the scenario itself ended."""
 
 
-def replay(draft: Draft, trajectories: Mapping[str, WorldTrajectory]) -> tuple[str, ...]:
+def replay(draft: Draft, trajectories: Mapping[str, Track]) -> tuple[str, ...]:
     """Put trajectories in place of all maneuvers: all else happens when it happened in the run; who follows one."""
     alone = draft.is_adapted and draft.version < TRAILERS_SINCE
     pulled = set() if alone else pulled_entities(draft.scenario, draft.motion)
