@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.base.rows import status_bytes
+from xosc_lateral.base.memory import status_bytes
 
 
 @contextmanager

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Unpack
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
-from xosc_lateral.base.rows import spilling_to
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
@@ -107,7 +106,7 @@ def convert_scenario(
     Raises `XoscLateralError`: when the input is at fault; nothing is written then; `OSError`: when the output can't be
     written; nothing is left half-written.
     """
-    with guarding_inputs(), spilling_to(output.parent if saves else None):
+    with guarding_inputs():
         prepared = prepare(source, settings)
         plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
         return carry_out(plan)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import BLOCK, blocks, columns, stored
+from xosc_lateral.base.rows import BLOCK, blocks, columns
 from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
@@ -249,8 +249,8 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         subject = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], subject, segment.time[segment.inside])
-        error = stored(sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples)))
-        samples.append(_Sample(spans, knots, stored(offset), error, beyond))
+        error = sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples))
+        samples.append(_Sample(spans, knots, offset, error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
@@ -266,7 +266,7 @@ def _apart(
     moved = dict[str, _Drawn]()
     for vehicle, move in zip(certain, moves, strict=True):
         if move is not None:
-            aside = (stored(one.offset + np.interp(one.knots, rows, move)) for one in vehicle.samples)
+            aside = (one.offset + np.interp(one.knots, rows, move) for one in vehicle.samples)
             samples = tuple(one._replace(offset=offset) for one, offset in zip(vehicle.samples, aside, strict=True))
             moved[vehicle.motion.name] = replace(vehicle, samples=samples)
     return [moved.get(one.motion.name, one) for one in drawn]
@@ -281,7 +281,7 @@ def _sampled(vehicle: _Drawn, rows: IntArray) -> SampledVehicle:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
     seen = vehicle.seen
-    return SampledVehicle(vehicle.motion, stored(deviation), stored(can_move), seen.responds, seen.alone)
+    return SampledVehicle(vehicle.motion, deviation, can_move, seen.responds, seen.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
@@ -291,7 +291,7 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         return untouched(entity, drawn.spans, drawn.why)
     driven = [drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples]
     samples = tuple(
-        one._replace(offset=stored(offset + one.error)) for one, (offset, _) in zip(drawn.samples, driven, strict=True)
+        one._replace(offset=offset + one.error) for one, (offset, _) in zip(drawn.samples, driven, strict=True)
     )
     bounds = [bound for _, bound in driven if bound is not None]
     deviation = replace(drawn, samples=samples).deviation()
@@ -315,7 +315,7 @@ def _parts(sample: _Sample, entity: EntityMotion) -> Iterator[SampledSegment]:
         inside = slice(*np.searchsorted(sample.knots, (span.first, span.last + 1)))
         if span.is_road_following and inside.stop - inside.start > 1:
             beyond = sample.beyond if span is sample.spans[-1] else np.empty(0)
-            yield SampledSegment(span, stored(entity.time[sample.knots[inside]]), sample.offset[inside], beyond)
+            yield SampledSegment(span, entity.time[sample.knots[inside]], sample.offset[inside], beyond)
 
 
 def _with_trailers(

@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.rows import blocks, stored
+from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT
@@ -82,7 +82,7 @@ def seen_by(
     segments: list[SeenSegment] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for spans in runs:
-        knots = stored(np.arange(spans[0].first, spans[-1].last + 1, every))
+        knots = np.arange(spans[0].first, spans[-1].last + 1, every)
         if len(knots) < 2:
             continue
         for span in spans:

@@ -19,7 +19,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import BLOCK, stored
+from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
@@ -61,7 +61,7 @@ def gaps_of(motion: NominalMotion, paths: Sequence[Track]) -> tuple[Gap, ...]:
     for entity, path in vehicles:
         absent = (entity.activity[every] & Activity.ACTIVE) == 0
         x = np.where(absent, np.nan, path.x[every])
-        x, y, heading = (stored(values) for values in (x, path.y[every], path.heading[every]))
+        y, heading = path.y[every], path.heading[every]
         boxes.append(EntityMotion.of(entity.entity, entity.time[every], x=x, y=y, heading=heading))
     return smallest_gaps(boxes)
 

@@ -17,7 +17,7 @@ from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, rows_where, scratch, slices_where
+from xosc_lateral.base.rows import blocks, rows_where, slices_where
 from xosc_lateral.world.motion.nominal import Activity
 
 VERTEX_STEP = 0.1
@@ -77,7 +77,7 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     Every `VERTEX_STEP` (or evenly more often, for sharp bends), but never closer than `VERTEX_SPACING`. Counted from
     the start, and near the end from the end, so that the last stretch before a stop is not longer than it has to be.
     """
-    way, driven = scratch(len(time)), np.zeros(1)
+    way, driven = np.empty(len(time)), np.zeros(1)
     way[:1] = 0.0
     for rows in blocks(len(time), 1):
         around = slice(rows.start - 1, rows.stop)

@@ -20,7 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, columns, empty, put, rows_where, scratch
+from xosc_lateral.base.rows import blocks, columns, rows_where
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
@@ -37,7 +37,7 @@ _MAXIMUM_LATERAL_SPEED = 10.0
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
     """Distance driven on the nominal path up to each row, shape (n,); being placed anew is no driving. [m]"""
-    distance = scratch(len(motion.x))
+    distance = np.empty(len(motion.x))
     distance[:1] = 0.0
     for rows in blocks(len(distance), 1):
         around = slice(rows.start - 1, rows.stop)
@@ -114,11 +114,11 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
     Nominal heading, and the shifted path's direction against the nominal one's, held where one stands. Nominal speed
     times the ratio of path lengths, which stays right at a speed step.
     """
-    heading, speed = empty(len(x)), empty(len(x))
+    heading, speed = np.empty(len(x)), np.empty(len(x))
     for piece in (slice(a, b) for a, b in pairwise([0, *motion.breaks.tolist(), len(x)])):
         if piece.stop - piece.start < 2:
-            put(heading, piece, motion.heading[piece] + 0.0)
-            put(speed, piece, motion.speed[piece])
+            heading[piece] = motion.heading[piece] + 0.0
+            speed[piece] = motion.speed[piece]
             continue
         held, waiting = 0.0, piece.start  # rows from `waiting` on stand at the piece's start: as where it moves first
         for rows, around, inside in _overlapping(piece):
@@ -128,14 +128,14 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
             turn = np.angle(shifted * np.conj(nominal))
             length, longer = (np.hypot(step.real, step.imag) for step in (nominal, shifted))
             driven = length > _STANDSTILL
-            put(speed, rows, motion.speed[rows] * np.where(driven, longer / np.where(driven, length, 1.0), 1.0))
+            speed[rows] = motion.speed[rows] * np.where(driven, longer / np.where(driven, length, 1.0), 1.0)
             last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
             if waiting >= 0 and moving.any():
                 held = float(turn[int(np.argmax(moving))])
                 for earlier in blocks(rows.start, waiting):
-                    put(heading, earlier, motion.heading[earlier] + held)
+                    heading[earlier] = motion.heading[earlier] + held
                 waiting = -1
-            put(heading, rows, motion.heading[rows] + np.where(last < 0, held, turn[last]))
+            heading[rows] = motion.heading[rows] + np.where(last < 0, held, turn[last])
             held = held if last[-1] < 0 else float(turn[last[-1]])
     return heading, speed
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, stored
+from xosc_lateral.base.memory import free_bytes
+from xosc_lateral.base.rows import BLOCK, columns
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.world.player.drive import align_trailers, connect, drive, halt_at_road_end, pull_trailers
 from xosc_lateral.world.player.recorder import NO_LANE
@@ -32,6 +33,9 @@ _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times a
 
 LEAST_PUT_AWAY = 2048
 """Frames after which rows are put away at the earliest: fewer in each piece would make too many of them."""
+
+ROW_SIZE = 150
+"""What becomes of a row: 89 bytes of motion, and 64 of the path that is made from it. [byte]"""
 
 STANDING_SPEED = 1e-3
 """Below this speed an entity stands. [m/s]"""
@@ -204,8 +208,19 @@ class _Player:
         for rows in self.rows:
             rows.put_away()
         if self.times:
-            self._times_put_away.append(stored(np.array(self.times)))
+            self._times_put_away.append(np.array(self.times))
             del self.times[:]
+            self._require_memory()
+
+    def _require_memory(self) -> None:
+        rows = len(self.rows) * self.simulation.unwatched.frames
+        needed, free = ROW_SIZE * rows, free_bytes()
+        if needed > free:
+            what = f"{rows} rows until {self.simulation.time:.0f} s need {needed / 1e6:.0f} MB of memory"
+            advice = "play a shorter time, or in longer steps"
+            raise PlaybackError(
+                f"{what}, and {max(free, 0.0) / 1e6:.0f} MB are free: {advice}", path=self.simulation.scenario.path
+            )
 
     def _result(self, ended_by: str, cut_off: Note | None) -> NominalMotion:
         simulation = self.simulation

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from xosc_lateral.base.errors import FormatError, PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns, stored
+from xosc_lateral.base.rows import BLOCK, columns
 from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road.network import RoadNetwork
@@ -104,9 +104,9 @@ class Rows:
             rows, free = np.array(self._free_rows), np.array(self._free).reshape(-1, 6)
             unknown = np.array(self._road)[rows - self._rows_put_away] == _UNKNOWN
             self._knows_height &= not np.isnan(free[unknown, 2]).any()
-            self._free_put_away.append((stored(rows), stored(free.ravel()).reshape(-1, 6)))
+            self._free_put_away.append((rows, free))
         self._rows_put_away += len(self._road)
-        self._put_away.append(stored(np.frombuffer(b"".join(self._columns), dtype=np.uint8)))
+        self._put_away.append(np.frombuffer(b"".join(self._columns), dtype=np.uint8))
         for column in (*self._columns, self._free_rows, self._free):
             del column[:]
 

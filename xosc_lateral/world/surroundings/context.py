@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, put
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import VehicleCategory
@@ -201,7 +200,7 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
     """On every so many rows of the run."""
     names = ("road", "lane", "s", "offset", "activity", "heading_relative")
     count, n = len(motion.entities), len(motion.entities[0].time[first::every])
-    tables = [empty((count, n), kind) for kind in (np.int32, np.float64, np.float64, np.int8)]
+    tables = [np.empty((count, n), kind) for kind in (np.int32, np.float64, np.float64, np.int8)]
     together = max(1, ROWS_TOGETHER // max(n, 1))
     for begin in range(0, count, together):
         entities = motion.entities[begin : begin + together]
@@ -214,7 +213,7 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
         direction[present] = network.travel_directions(road[present], lane[present])
         direction = np.where(np.cos(heading) < 0.0, -direction, direction)
         for table, values in zip(tables, (road, s, t, direction), strict=True):
-            put(table, slice(begin, begin + together), values.reshape(-1, n))
+            table[begin : begin + together] = values.reshape(-1, n)
     boxes = [one.entity.bounding_box for one in motion.entities]
     length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
     is_truck = np.array([one.entity.vehicle_category in TRUCKS for one in motion.entities])

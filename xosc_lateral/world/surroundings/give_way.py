@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import empty, put, stored
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.around import pairs_now, smooth_step, stretches_within
@@ -78,9 +77,9 @@ def give_way(
     None: not at all. Shape (n,). [m]
     """
     count, n = len(sampled), len(rows)
-    left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
+    left, right, none = np.empty((count, n)), np.empty((count, n)), np.zeros(n)
     kinds = (np.float64, np.float64, np.float64, np.float64, bool, bool)
-    tables = [empty((count, n), kind) for kind in kinds]  # x, y, heading, deviation, can_move, present
+    tables = [np.empty((count, n), kind) for kind in kinds]  # x, y, heading, deviation, can_move, present
     left_hand = np.zeros(count, dtype=bool)
     for k, samples in enumerate(sampled):
         entity, box, heading = samples.motion, samples.motion.entity.bounding_box, samples.motion.heading[rows]
@@ -91,7 +90,7 @@ def give_way(
         present = ((entity.activity[rows] & Activity.ACTIVE) != 0) & entity.entity.is_vehicle
         columns = (none, none, x, y, heading, samples.deviation, samples.can_move, present)
         for table, values in zip((left, right, *tables), columns, strict=True):
-            put(table, slice(k, k + 1), np.asarray(values))
+            table[k] = values
     there_x, there_y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]
     )
@@ -124,7 +123,7 @@ def give_way(
     result: list[FloatArray | None] = []
     for k in range(count):
         aside = left[k] - right[k]
-        result.append(stored(_smoothed(aside, smoothed)) if aside.any() else None)
+        result.append(_smoothed(aside, smoothed) if aside.any() else None)
     return result
 
 

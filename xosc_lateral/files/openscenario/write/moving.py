@@ -10,7 +10,7 @@ from lxml import etree
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import blocks, columns, stored
+from xosc_lateral.base.rows import blocks, columns
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import ColumnsOf, Pose, TimedVertices
@@ -176,7 +176,7 @@ def _columns_of(path: Track, rows: slice, times: FloatArray, version: build.Vers
     """Columns of the vertices at some times, which have the headings of a little later."""
     time, speed, heading = path.time[rows], path.speed[rows], _unwrapped(path.heading[rows])
     arrays = [values[rows] for values in (path.x, path.y, path.z, path.pitch, path.roll)]
-    times, later = stored(times), stored(_heading_times(times))
+    later = _heading_times(times)
 
     def columns_of(part: slice) -> list[FloatArray]:
         around = _around(time, times[part])
