@@ -298,6 +298,32 @@ def test_a_vehicle_under_test_can_not_be_enriched_and_none_stands_alone(
     assert main([*words, "--ego", "none", "--ego", "A"]) == 2
 
 
+def test_who_is_called_ego_is_left_as_it_is_and_said(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = scenario.read_text()
+    scenario.write_text(text.replace(EXTERNAL, "").replace('"Ego"', '"VUT"'))
+    converted = xl.convert(scenario, tmp_path / "out.xosc")
+    assert converted.ego == ("VUT",) and _of(tmp_path / "out.xosc", "VUT") == _of(scenario, "VUT")
+    assert "under test, left as written: VUT (by its name)" in str(converted)
+    assert "VUT" in xl.convert(scenario, ego="none").enriched
+    assert xl.convert(scenario, ego=["A"]).ego == ("A",), "who names one means this one"
+    scenario.write_text(text.replace('"C"', '"hero"'))
+    assert main(["convert", str(scenario), "-o", str(tmp_path / "two.xosc"), "--strict"]) == 1
+    assert "'hero' is called like a vehicle under test, but 'Ego' (controller" in capsys.readouterr().out
+    assert main(["convert", str(scenario), "-o", str(tmp_path / "two.xosc"), "--ego", "Ego"]) == 0
+    assert "is called like" not in capsys.readouterr().out
+
+
+def test_a_folder_sums_up_who_is_under_test(scenario: Path, tmp_path: Path) -> None:
+    text = scenario.read_text().replace(EXTERNAL, "")
+    for k, name in enumerate(("Ego", "Ego", "hero", "Nobody")):
+        scenario.with_name(f"case{k}.xosc").write_text(text.replace('"Ego"', f'"{name}"'))
+    scenario.unlink()
+    batch = xl.convert_many(scenario.parent, tmp_path / "out", workers=0)
+    assert "under test, left as written: Ego in 2, hero in 1, nobody in 1" in str(batch)
+
+
 def _moves_on(path: Path, name: str, *moments: int) -> list[bool]:
     """Whether a vehicle moves sideways in the 4 s from each moment on when a scenario is played."""
     vehicle = next(entity for entity in play_scenario(path).motion.entities if entity.name == name)

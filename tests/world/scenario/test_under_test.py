@@ -26,31 +26,41 @@ def controller(name: str, value: str) -> str:
 @pytest.mark.parametrize(
     ("made_entity", "is_one"),
     [
-        (entity("Ego", controller=controller("esminiController", "ExternalController")), True),
-        (entity("Ego", controller=controller("esminiController", "UDPDriverController")), True),
-        (entity("Ego", controller=controller("module", "external_control")), True),
-        (entity("Ego", vehicle().replace("<Properties/>", CARLA_EGO)), True),
-        (entity("Ego", controller=controller("esminiController", "ACCController")), False),
-        (entity("Ego"), False),
+        (entity("Car", controller=controller("esminiController", "ExternalController")), True),
+        (entity("Car", controller=controller("esminiController", "UDPDriverController")), True),
+        (entity("Car", controller=controller("module", "external_control")), True),
+        (entity("Car", vehicle().replace("<Properties/>", CARLA_EGO)), True),
+        (entity("Car", controller=controller("esminiController", "ACCController")), False),
+        (entity("Car"), False),
     ],
     ids=["external", "udp", "carla", "carla type", "acc", "nobody"],
 )  # fmt: skip
 def test_a_vehicle_that_somebody_else_drives_is_found_by_what_says_so(
     tmp_path: Path, made_entity: str, is_one: bool
 ) -> None:
-    scenario = made(tmp_path, entities=made_entity, init=private("Ego"))
+    own = stories(("Car", event("own", at(1.0), speed_action())))
+    scenario = made(tmp_path, entities=made_entity, init=private("Car"), stories=own)
     assert bool(vehicles_under_test(scenario)) == is_one
 
 
-@pytest.mark.parametrize("name", ["hero", "ego_vehicle"])
-def test_carlas_names_say_it_too(tmp_path: Path, name: str) -> None:
-    scenario = made(
-        tmp_path,
-        entities=entity(name),
-        init=private(name),
-        stories=stories((name, event("own", at(1.0), speed_action()))),
-    )
-    assert vehicles_under_test(scenario) == {name: f"its name is '{name}'"}
+@pytest.mark.parametrize(
+    ("name", "is_one"),
+    [
+        *((name, True) for name in ("Ego", "ego", "EGO", "hero", "ego_vehicle", "EgoVehicle", "Ego2", "ego_vehicle_1")),
+        *((name, True) for name in ("VUT", "SUT", "Host", "host vehicle", "SubjectVehicle", "subject_vehicle")),
+        *((name, False) for name in ("Egon", "Lego", "subject", "Target", "hostile", "Car1", "hero_truck_driver")),
+    ],
+)
+def test_the_names_of_the_field_say_it_too(tmp_path: Path, name: str, is_one: bool) -> None:
+    own = stories((name, event("own", at(1.0), speed_action())))
+    scenario = made(tmp_path, entities=entity(name), init=private(name), stories=own)
+    assert vehicles_under_test(scenario) == ({name: "by its name"} if is_one else {})
+
+
+def test_a_mark_says_it_before_a_name(tmp_path: Path) -> None:
+    external = entity("Car", controller=controller("esminiController", "ExternalController"))
+    scenario = made(tmp_path, entities=entity("Ego") + external, init=private("Ego") + private("Car"))
+    assert list(vehicles_under_test(scenario)) == ["Car"]
 
 
 def event(name: str, trigger: str, content: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from itertools import pairwise
@@ -70,12 +70,6 @@ def write_osi(
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)
     messages = ground_truths(motion, network, trajectories, host=host)
     return replace_atomically(path, lambda temporary: _save(temporary, messages, description))
-
-
-def host_of(motion: Traffic, under_test: Iterable[str]) -> str | None:
-    """Host vehicle: the first under test, else the one whose name is ego; None: there is neither."""
-    ego = (entity.name for entity in motion.entities if entity.name.casefold() == "ego")
-    return next(iter(under_test), None) or next(ego, None)
 
 
 def _save(path: Path, messages: Iterator[Any], description: str) -> None:

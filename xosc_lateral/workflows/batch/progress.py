@@ -14,6 +14,9 @@ from typing import TextIO
 
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 
+NOBODY = "nobody"
+"""Where no vehicle is under test."""
+
 LINES_EVERY = 30.0
 """Without a terminal a line of progress comes this often. [s]"""
 
@@ -42,6 +45,7 @@ class Summary:
     anew: dict[str, int] = field(default_factory=dict)  # why outputs that were there were made anew -> how many
     kept: dict[str, int] = field(default_factory=dict)  # the same of those that were to be kept as they are
     cut_off: list[str] = field(default_factory=list)  # outputs of runs that the time limit cut off
+    under_test: dict[str, int] = field(default_factory=dict)  # names of vehicles under test -> in how many outputs
     nobody_enriched: dict[str, int] = field(default_factory=dict)  # why no entity got offsets -> in how many outputs
     became: dict[str, tuple[JobState, float]] = field(default_factory=dict, repr=False)  # by output; what it took [s]
     _shown: set[tuple[str, str]] = field(default_factory=set, repr=False)
@@ -61,6 +65,8 @@ class Summary:
             reasons = self.anew if outcome.state is JobState.WRITTEN else self.kept
             reasons[outcome.why] = reasons.get(outcome.why, 0) + 1
         self.with_warnings += bool(row.warnings)
+        who = " and ".join(row.ego) or NOBODY
+        self.under_test[who] = self.under_test.get(who, 0) + 1
         if row.cut_off:
             self.cut_off.append(row.output)
         if not row.enriched:
@@ -93,6 +99,9 @@ class Summary:
     def remarks(self) -> list[str]:
         """What a person has to know besides the counts, a line each."""
         lines = []
+        if self.under_test:
+            names = sorted(self.under_test.items(), key=lambda item: (item[0] == NOBODY, -item[1], item[0]))
+            lines.append(f"  under test, left as written: {', '.join(f'{who} in {count}' for who, count in names)}")
         if self.with_warnings:
             lines.append(f"  {self.with_warnings} with warnings (column `warnings` of the manifest)")
         if self.nobody_enriched:

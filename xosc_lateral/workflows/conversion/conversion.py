@@ -153,12 +153,12 @@ class Conversion(ConvertedScenario, Result):
         tuple of Path
             The two files: ``.mcap`` or ``.osi``, one `GroundTruth` per step.
         """
-        from xosc_lateral.files.osi.write import host_of, write_osi
+        from xosc_lateral.files.osi.write import write_osi
 
         enriched, nominal = outputs = osi_files(path, self.source)
         claim(outputs, [self.source], force=force)
         made = self.movement
-        host = host_of(made.motion, self.ego)
+        host = next(iter(self.ego), None)
         words = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant + 1}"
         paths = [entity.trajectory for entity in made.entities]
         write_osi(enriched, made.motion, made.network, paths, host=host, description=words)

@@ -20,7 +20,7 @@ from xosc_lateral.workflows.conversion.consequences import stay_as_written, vali
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning
-from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers
+from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers, other_egos
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
@@ -182,6 +182,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
     wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
     warnings = (
         *(() if cut_off is None else (str(cut_off),)),
+        *other_egos(plan.played.scenario, plan.settings, plan.egos),
         *movement.warnings(),
         *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),
         *(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
@@ -202,6 +203,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         is_replay=plan.is_replay,
         shifts=written.shifts,
         controllers=plan.controllers,
+        egos=plan.egos,
     )
 
 

@@ -25,7 +25,13 @@ from xosc_lateral.workflows.conversion.result import Drivers, LaneChanges
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings, OutputMode
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.controllers import Control, controlled_entities, vehicles_under_test
+from xosc_lateral.world.scenario.controllers import (
+    BY_NAME,
+    Control,
+    controlled_entities,
+    named_under_test,
+    vehicles_under_test,
+)
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
@@ -175,9 +181,11 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
     """Vehicles under test, and why each is one; `FormatError`: one of them was also to be enriched."""
     if settings.ego is not None and not settings.ego:
         return {}
-    egos = vehicles_under_test(scenario)
     names = {entity.name for entity in scenario.entities}
-    egos |= {name: "named by --ego" for name in sorted(settings.ego or ()) if name in names}
+    named = {name: "named by --ego" for name in sorted(settings.ego or ()) if name in names}
+    egos = vehicles_under_test(scenario)
+    if named:  # who names them means these: a name of the file says nothing then, a mark does
+        egos = {name: why for name, why in egos.items() if why != BY_NAME} | named
     for option, wanted in (("--entity", settings.entity), ("--only", settings.only or ())):
         for name in wanted:
             if name in egos:
@@ -187,6 +195,21 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
                     path=scenario.path,
                 )
     return egos
+
+
+def other_egos(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str, str]) -> tuple[str, ...]:
+    """Says that others could be under test as well, where nobody has named one."""
+    if settings.ego is not None and (not settings.ego or "named by --ego" in egos.values()):
+        return ()
+    which = "--ego says which one is"
+    by_name = [repr(name) for name, why in egos.items() if why == BY_NAME]
+    if len(by_name) > 1:
+        return (f"{' and '.join(by_name)} are called like vehicles under test, and all left as written: {which}",)
+    marked = " and ".join(f"{name!r} ({why})" for name, why in egos.items())
+    others = [name for name in named_under_test(scenario) if name not in egos]
+    return tuple(
+        f"{name!r} is called like a vehicle under test, but {marked} is marked as one: {which}" for name in others
+    )
 
 
 def heeds_controllers(settings: ConvertSettings) -> bool:

@@ -250,6 +250,7 @@ class ConvertedScenario:
     # shifts: how much earlier or later events of a reactive output come, the largest under several egos [s]
     shifts: tuple[EventShift, ...] = ()
     controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
+    egos: Mapping[str, str] = field(default_factory=dict)  # vehicles under test, and why each is one
     report: Path | None = None  # page that was written, if one was
 
     @property
@@ -298,7 +299,8 @@ class ConvertedScenario:
     @property
     def under_test(self) -> str:
         """Vehicles that are not the storyboard's: under test, or driven by controllers, in a line."""
-        lines = [f"under test, left as written: {', '.join(self.ego)}"] if self.ego else []
+        egos = ", ".join(f"{name} ({why})" for name, why in self.egos.items())
+        lines = [f"under test, left as written: {egos}"] if egos else []
         lines += [f"'{name}' is left to controller {control}" for name, control in self.controllers.items()]
         if lines:
             return "; ".join(lines)

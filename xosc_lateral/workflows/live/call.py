@@ -222,11 +222,14 @@ class LiveRun(Result):
         Raises `SimulationError` if SUMO's network can't be made a road.
         """
         from xosc_lateral.files.osi import SUFFIXES
-        from xosc_lateral.files.osi.write import host_of, write_osi
+        from xosc_lateral.files.osi.write import write_osi
         from xosc_lateral.workflows.live.scene import motion_of
+        from xosc_lateral.world.scenario.controllers import is_named_under_test
 
         output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
         claim([output], force=force)
         network = self._scene.network()
         motion = motion_of(self._rows, self._scene, network)
-        return write_osi(output, motion, network, host=host_of(motion, self._scene.ego), description=self.headline())
+        names = (entity.name for entity in motion.entities if is_named_under_test(entity.name))
+        host = next(iter((*self._scene.ego, *names)), None)
+        return write_osi(output, motion, network, host=host, description=self.headline())

@@ -187,13 +187,13 @@ class Playback(Result):
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
         from xosc_lateral.files.osi import SUFFIXES
-        from xosc_lateral.files.osi.write import host_of, write_osi
+        from xosc_lateral.files.osi.write import write_osi
         from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
         claim([output], self._inputs(), force=force)
         motion, network = self._played.motion, self._played.network
-        host = host_of(motion, vehicles_under_test(self._played.scenario))
+        host = next(iter(vehicles_under_test(self._played.scenario)), None)
         return write_osi(output, motion, network, host=host, description=f"{self.scenario.name}, as its maneuvers say")
 
     def _inputs(self) -> list[Path]:

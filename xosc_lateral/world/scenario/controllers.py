@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntFlag
@@ -210,19 +211,37 @@ EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
 }
 """Property of a vehicle -> values that leave it to somebody else; both in lower case."""
 
-EXTERNAL_NAMES = frozenset({"hero", "ego_vehicle"})
-"""Names by which CARLA's tools look for the vehicle that they drive (its `role_name`)."""
+NAMED_UNDER_TEST = re.compile(
+    r"((ego|hero|vut|sut|host)([ _-]?(vehicle|car))?|subject[ _-]?(vehicle|car))[ _-]?\d*", re.IGNORECASE
+)
+"""What the field calls the vehicle under test: esmini and CARLA (`hero`, `ego_vehicle`), Euro NCAP (VUT), UN R157
+(ego), ISO 34501 (subject vehicle), ASAM OSI (host vehicle)."""
+
+
+BY_NAME = "by its name"
+"""Why a vehicle is under test that nothing marks."""
+
+
+def is_named_under_test(name: str) -> bool:
+    """Whether an entity's name is one of those for a vehicle under test."""
+    return NAMED_UNDER_TEST.fullmatch(name.strip()) is not None
 
 
 def vehicles_under_test(scenario: Scenario) -> dict[str, str]:
-    """Vehicles that the scenario leaves to somebody else, in its order, and what says so."""
+    """Vehicles that the scenario leaves to somebody else, in its order, and what says so.
+
+    A mark for another program (a controller, a property) says it first; without any, the name does.
+    """
     assigned = assigned_controllers(scenario)
-    egos = {}
-    for entity in scenario.entities:
-        why = _why(entity, assigned[entity.name]) if entity.is_vehicle else ""
-        if why:
-            egos[entity.name] = why
-    return egos
+    vehicles = [entity for entity in scenario.entities if entity.is_vehicle]
+    marked = {entity.name: _mark(entity, assigned[entity.name]) for entity in vehicles}
+    return {name: why for name, why in marked.items() if why} or named_under_test(scenario)
+
+
+def named_under_test(scenario: Scenario) -> dict[str, str]:
+    """Vehicles whose name says that they are under test, in the scenario's order, and what says so."""
+    names = (entity.name for entity in scenario.entities if entity.is_vehicle)
+    return {name: BY_NAME for name in names if is_named_under_test(name)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,14 +297,14 @@ def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
     return assigned
 
 
-def _why(entity: Entity, controllers: Iterable[Controller]) -> str:
+def _mark(entity: Entity, controllers: Iterable[Controller]) -> str:
     for controller in controllers:
         if kind_of(controller).is_external:
             return f"controller {named(controller)}"
     for name, value in entity.properties.items():
         if value.strip().lower() in EXTERNAL_ENTITIES.get(name.strip().lower(), ()):
             return f"{name} {value}"
-    return f"its name is '{entity.name}'" if entity.name in EXTERNAL_NAMES else ""
+    return ""
 
 
 def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:

@@ -38,6 +38,7 @@ from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, w
 from xosc_lateral.files.openscenario.write.older import add_missing_overrides
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
+from xosc_lateral.world.scenario.controllers import is_named_under_test
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, Priority
 from xosc_lateral.world.scenario.scenario import Scenario
@@ -209,7 +210,7 @@ def _entities(losses: Losses, scenario: Scenario, converted: Sequence[str]) -> N
             losses.note(f"'{entity.name}': ScenarioRunner does not move a {entity.category.value}")
     properties = (item for vehicle in vehicles.values() for item in vehicle.iter("{*}Property"))
     if vehicles and _EGO not in ((item.get("name"), item.get("value")) for item in properties):
-        chosen = next((name for name in vehicles if name.lower() in ("ego", "hero")), next(iter(vehicles)))
+        chosen = next((name for name in vehicles if is_named_under_test(name)), next(iter(vehicles)))
         owner = vehicles[chosen].find("{*}Properties")
         assert owner is not None  # asked for by version 1.0
         for old in [old for old in owner if old.get("name") == _EGO[0]]:
