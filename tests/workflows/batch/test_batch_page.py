@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tests.workflows.batch.test_manifest import ROW
-from xosc_lateral.workflows.batch.call import batch_page
+from xosc_lateral.workflows.batch.page import batch_page, by_cause
 
 CALM = replace(ROW, output="calm.xosc", gap_before=2.0, gap_after=1.9, warnings=(), error="")
 
@@ -26,8 +26,8 @@ def page() -> str:
 
 
 def test_failures_come_first_then_contacts_then_warnings(page):
-    outputs = re.findall(r"[a-z_]+\.xosc(?=<)", page)
-    assert outputs[:5] == ["broken.xosc", "touching.xosc", "warned.xosc", "calm.xosc", "touching_before.xosc"]
+    outputs = re.findall(r"[a-z_]+\.xosc(?=<)", page.split("<tbody>")[1])
+    assert outputs == ["broken.xosc", "touching.xosc", "warned.xosc", "calm.xosc", "touching_before.xosc"]
 
 
 def test_only_what_needs_attention_is_marked(page):
@@ -35,9 +35,23 @@ def test_only_what_needs_attention_is_marked(page):
 
 
 def test_a_failed_output_has_its_reason_and_no_link_or_picture(page):
-    row = page.split("broken.xosc", 1)[1].split("</tr>")[0]
-    assert "failed: broken.xosc:3: no road" in row
+    assert "<b>1</b> no road</summary><ul><li>broken.xosc: broken.xosc:3: no road</li>" in page
     assert "<img" not in page.split('<tr class="bad">')[1].split("</tr>")[0]
+
+
+def test_the_lead_and_the_tiles_count_what_is_listed(page):
+    assert "1 of 5 outputs could not be made, for 1 cause." in page
+    tiles = dict(re.findall(r"<dt>([^<]+)</dt><dd>(\d+)</dd>", page))
+    assert tiles == {"outputs": "4", "failed": "1", "with new contacts": "1", "with warnings": "1"}
+    assert page.count("<td>failed</td>") == 1 and page.count("<td>new contact</td>") == 1
+
+
+def test_causes_are_alike_but_for_files_names_and_numbers():
+    said = [(replace(CALM, output=f"{k}.xosc"), f"a/{k}.xosc:{k}: no entity 'X{k}' at {k}.5 s") for k in range(3)]
+    said += [(CALM, "calm.xosc: the file is empty")] * 2
+    (several, of_several), (one, of_one) = by_cause(said)
+    assert (several, len(of_several)) == ("no entity … at … s", 3)
+    assert (one, of_one) == ("the file is empty", [CALM]), "one output counts once"
 
 
 def test_warnings_are_escaped(page):

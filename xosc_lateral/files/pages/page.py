@@ -71,6 +71,15 @@ class Html(str):
     __slots__ = ()
 
 
+class Group(NamedTuple):
+    """What several things have in common."""
+
+    number: int
+    what: str
+    members: Sequence[str]  # A line each; folded away until somebody asks.
+    tone: Tone = ""
+
+
 class Page:
     """A page in the making."""
 
@@ -112,8 +121,16 @@ class Page:
 
     def items(self, lines: Iterable[str]) -> None:
         """Add a list; nothing if it is empty."""
-        points = "".join(f"<li>{inline(line)}</li>" for line in lines)
+        points = _points(lines)
         self._main += [f"<ul>{points}</ul>"] if points else []
+
+    def groups(self, groups: Iterable[Group]) -> None:
+        """Add groups, each a line with its number that unfolds into its members."""
+        self._main += [
+            f'<details class="{" ".join(filter(None, ("group", one.tone)))}"><summary><b>{one.number}</b> '
+            f"{inline(one.what)}</summary><ul>{_points(one.members)}</ul></details>"
+            for one in groups
+        ]
 
     def figure(self, figure: Figure, caption: str, alt: str = "", *, over_time: bool = False) -> None:
         """Add a figure with a caption; `alt`: for those who can't see it; `over_time`: x is the player's time."""
@@ -130,16 +147,19 @@ class Page:
         *,
         formats: Mapping[str, str] | None = None,
         tones: Mapping[int, Tone] | None = None,
+        long: bool = False,
     ) -> None:
         """Add a table, headed by the keys of the first row, or say that there are no rows.
 
         `formats`: format specification by column, such as ``{"p": ".1e"}``; `tones`: row number, from 0, to its
-        background.
+        background; `long`: it scrolls in a window of its own, can be filtered, and sorted by its headings.
         """
         if not rows:
             self._main.append(f"<p>{inline(f'{caption}: none.' if caption else 'None.')}</p>")
             return
-        self._main.append(_table(rows, list(rows[0]), caption, formats or {}, tones or {}))
+        if long:
+            self._need("tables.js")
+        self._main.append(_table(rows, list(rows[0]), caption, formats or {}, tones or {}, long=long))
 
     def player(self, scene: str, label: str, *, anchor: str = "scene") -> None:
         """Add the player; `scene` is the JSON of `playing.scene`, `anchor` what a link on the page leads to it by."""
@@ -200,6 +220,10 @@ def inline(text: object) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(str(text)))
 
 
+def _points(lines: Iterable[str]) -> str:
+    return "".join(f"<li>{line if isinstance(line, Html) else inline(line)}</li>" for line in lines)
+
+
 def _key_figure(figure: KeyFigure) -> str:
     note = f'<dd class="note">{inline(figure.note)}</dd>' if figure.note else ""
     value = f"<dt>{inline(figure.label)}</dt><dd>{escape(format_value(figure.value))}</dd>"
@@ -212,6 +236,8 @@ def _table(
     caption: str,
     formats: Mapping[str, str],
     tones: Mapping[int, Tone],
+    *,
+    long: bool,
 ) -> str:
     numeric = {column for column in columns if all(_is_number(row.get(column)) for row in rows)}
 
@@ -228,7 +254,8 @@ def _table(
     head = "".join(cell("th", column, inline(column)) for column in columns)
     title = f"<caption>{inline(caption)}</caption>" if caption else ""
     body = "\n".join(line(number, row) for number, row in enumerate(rows))
-    return f'<div class="table"><table>{title}<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+    kind = "table long" if long else "table"
+    return f'<div class="{kind}"><table>{title}<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
 
 
 def _is_number(value: object) -> bool:

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
-from urllib.parse import quote
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.signals import Interrupted
-from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.output_paths import claim, output_folder
-from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
 from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
+from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
@@ -225,67 +221,3 @@ def _left_out(batch: Batch) -> str:
     kinds = Counter(kind.value for _, kind in batch.left_out)
     listed = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
     return f"; left out: {listed}" if listed else ""
-
-
-# ---- index of pages ----
-INDEX_PAGE = "index.html"
-
-GAP_COLUMNS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
-
-
-def write_batch_index(batch: Batch, folder: Path) -> Path:
-    """Write ``index.html`` over the pages of a finished batch, what needs attention first."""
-    pages = {job.name: job.page for job in batch.jobs if job.page is not None}
-    rows = [row for row in read_manifest(batch.folder / MANIFEST) if row.output in pages]
-    links = {row.output: quote(Path(os.path.relpath(pages[row.output], folder)).as_posix())
-             for row in rows if not row.error}  # fmt: skip
-    return write_atomically(folder / INDEX_PAGE, batch_page(rows, links, batch.folder.name))
-
-
-def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str) -> str:
-    """HTML index of a batch; same rows, same bytes. `links`: output -> its page; `name`: of the output folder."""
-    ranked = sorted(rows, key=_urgency)
-    failed, contacts = sum(bool(row.error) for row in rows), sum(map(_has_new_contact, rows))
-    page = Page(f"Batch {name}")
-    page.lead(
-        "All outputs of the batch: failures first, then scenarios in which vehicles collide that did not before, then "
-        "the others by number of warnings. The pictures show the paths from above, with the scale across the road "
-        "exaggerated."
-    )
-    page.key_figures(
-        [
-            KeyFigure(len(rows) - failed, "outputs"),
-            KeyFigure(failed, "failed", tone="bad" if failed else ""),
-            KeyFigure(contacts, "with collisions", "that the nominal motion does not have", "bad" if contacts else ""),
-            KeyFigure(sum(bool(row.warnings) for row in rows), "with warnings"),
-        ]
-    )
-    tones: dict[int, Tone] = {k: "bad" for k, row in enumerate(ranked) if row.error or _has_new_contact(row)}
-    formats = dict.fromkeys(("std. deviation of offsets [m]", *GAP_COLUMNS), ".2f")
-    page.table([_cells(row, links.get(row.output, "")) for row in ranked], "Outputs", formats=formats, tones=tones)
-    return page.html({})
-
-
-def _has_new_contact(row: ManifestRow) -> bool:
-    """Whether vehicles touch that nominally don't."""
-    before = float("inf") if row.gap_before is None else row.gap_before
-    return row.gap_after is not None and row.gap_after <= 0.0 < before
-
-
-def _urgency(row: ManifestRow) -> tuple[int, int, str]:
-    return 0 if row.error else 1 if _has_new_contact(row) else 2, -len(row.warnings), row.output
-
-
-def _cells(row: ManifestRow, link: str) -> dict[str, object]:
-    name, done, anchor = escape(row.output), not row.error, f'<a href="{escape(link)}">'
-    picture = escape(f"{link.removesuffix('.html')}.svg")
-    image = f'<img loading="lazy" width="200" height="64" src="{picture}" alt="Paths in {name}">'
-    return {
-        "paths": Html(f"{anchor}{image}</a>" if link else ""),
-        "output": Html(f"{anchor}{name}</a>" if link else name),
-        "enriched": f"{len(row.enriched)} of {row.entities}" if done else None,
-        "std. deviation of offsets [m]": row.offset_spread if done else None,
-        GAP_COLUMNS[0]: row.gap_before if done else None,
-        GAP_COLUMNS[1]: row.gap_after if done else None,
-        "warnings": "; ".join(row.warnings) or "none" if done else f"failed: {row.error}",
-    }
