@@ -192,7 +192,7 @@ class _Player:
             else:
                 state.put_in_world(state.pose)
                 what = "no initial position: it stands at the world's origin"
-            self.simulation.note(f"'{state.name}' has {what}", state.entity.place)
+            self.simulation.note(f"'{state.name}' has {what}", state.entity.place, is_doubt=state.active)
 
     def _write(self, time: float) -> None:
         self.times.append(time)

@@ -139,6 +139,7 @@ class Simulation:
         self.when_built: list[Callable[[Any], None]] = []
         """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
         self.notes: list[Note] = []
+        self.doubts: list[Note] = []
         self._noted: set[tuple[str, str, int | None]] = set()
         self.played: list[PlayedAction] = []
         """All actions started so far, in order of start."""
@@ -167,12 +168,12 @@ class Simulation:
             raise place.error(f"entity '{name}' is not in the scenario", PlaybackError)
         return state
 
-    def note(self, what: str, place: Place) -> None:
-        """Say, once for each place, that something was not played, or not as written."""
+    def note(self, what: str, place: Place, *, is_doubt: bool = False) -> None:
+        """Say, once for each place, that something was not played, or not as written; or that it can't be meant so."""
         key = (what, place.path, place.line)
         if key not in self._noted:
             self._noted.add(key)
-            self.notes.append(Note(what, place.path, place.line, place.element))
+            (self.doubts if is_doubt else self.notes).append(Note(what, place.path, place.line, place.element))
 
     def values_of(self, content: object) -> tuple[Values, str]:
         """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""

@@ -41,6 +41,9 @@ class RouteGuide:
 
     def choose(self, road: int, options: Sequence[LaneLink]) -> LaneLink | None:
         """The link that leads along the route, be it by another connecting road; None: the route does not say."""
+        for link in (link for step in self.steps for link in step.links):
+            if link in options:
+                return link
         roads = [step.road for step in self.steps]
         for index in (index for index, other in enumerate(roads) if other == road):
             way = self._towards(roads[index + 1 :], options)
@@ -56,6 +59,27 @@ class RouteGuide:
             onward = self.network.next_lanes(link.road, link.lane, link.direction)
             if len(ahead) > 1 and any(following.road == ahead[1] for following in onward):
                 return link
+        return None
+
+    @property
+    def length(self) -> float:
+        """[m]"""
+        return sum(abs(step.s_end - step.s_start) for step in self.steps)
+
+    def way_to(self, here: tuple[int, float], there: tuple[int, float]) -> float | None:
+        """Way along the route from a road and s to a later one; None: they don't lie on it so. [m]"""
+        left: float | None = None
+        for step in self.steps:
+            for road, s in (here, there):
+                into, length = (s - step.s_start) * step.direction, abs(step.s_end - step.s_start)
+                if road != step.road or not 0.0 <= into <= length:
+                    continue
+                if (road, s) == here and left is None:
+                    left = -into
+                elif (road, s) == there and left is not None and left + into >= 0.0:
+                    return left + into
+            if left is not None:
+                left += abs(step.s_end - step.s_start)
         return None
 
     def at(self, path_s: float) -> tuple[int, float, int]:
@@ -165,8 +189,13 @@ class EntityState:
 
     @property
     def lane_types(self) -> frozenset[str]:
-        """Types of the lanes that it is placed in."""
+        """Types of the lanes that it is placed in where nobody says which lane is its own."""
         return WALKED if self.entity.category is EntityCategory.PEDESTRIAN else DRIVING
+
+    def kept_types(self, *lanes: int) -> frozenset[str]:
+        """`lane_types`, and the types of its own lane and of others beside it: what it was put in, it stays in."""
+        section = self.network.roads[self.road].section_at(self.s).by_id
+        return self.lane_types.union(section[lane].type for lane in (self.lane, *lanes) if lane and lane in section)
 
     @property
     def place(self) -> Placement:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from xosc_lateral.world.player.actions import (
     at_once,
@@ -27,10 +29,16 @@ from xosc_lateral.world.player.storyboard import (
     StoryboardElement,
 )
 from xosc_lateral.world.scenario import scenario as read
+from xosc_lateral.world.scenario.dependence import entity_references
 from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
+from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.position import reference_of
-from xosc_lateral.world.scenario.private_actions import TeleportAction
+from xosc_lateral.world.scenario.private_actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    TeleportAction,
+)
 
 
 def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> StoryboardElement:
@@ -48,40 +56,54 @@ def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> Sto
 
 
 def init_actions(init: read.Init, simulation: Simulation) -> list[RunningAction]:
-    """Init actions in the order in which they start: an entity that is placed relative to another comes after it."""
-    actions = [
-        prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
+    """Init actions in the order in which they start.
+
+    They are a set: what is placed relative to an entity comes after all that places that one, global or private. Those
+    of one ``Private`` stay in order.
+    """
+    steps = [_InitStep(action, None) for action in (*init.global_actions, *init.user_defined_actions)]
+    steps += [_InitStep(action, private) for private in init.privates for action in private.actions]
+    return [
+        prepare_action(action, None if owner is None else simulation.actor(owner.entity_ref, owner.place), simulation)
+        for action, owner in _in_order(steps, simulation)
     ]
-    for private in _in_order(init.privates):
-        state = simulation.actor(private.entity_ref, private.place)
-        actions += [prepare_action(action, state, simulation) for action in private.actions]
-    return actions
 
 
-def _in_order(privates: tuple[read.Private, ...]) -> Iterator[read.Private]:
-    waiting = list(privates)
-    placed: set[str] = set()
-    names = {private.entity_ref for private in privates}
+class _InitStep(NamedTuple):
+    action: read.Action
+    owner: read.Private | None
+
+    @property
+    def placed(self) -> str:
+        """The entity that it puts somewhere; empty: none."""
+        if self.owner is not None:
+            return self.owner.entity_ref if isinstance(self.action.content, TeleportAction) else ""
+        return self.action.content.entity_ref if isinstance(self.action.content, AddEntityAction) else ""
+
+
+_PLACED_BESIDE = (TeleportAction, AddEntityAction, FollowTrajectoryAction, LaneChangeAction, LaneOffsetAction)
+"""Actions that look at once where the entities are that they refer to."""
+
+
+def _in_order(steps: list[_InitStep], simulation: Simulation) -> Iterator[_InitStep]:
+    waiting, unplaced = list(steps), Counter(step.placed for step in steps)
     while waiting:
-        for private in waiting:
-            needs = _references(private) & names - {private.entity_ref}
-            if needs <= placed or private is waiting[-1]:
+        held = set[int]()  # owners of whom an earlier action waits
+        chosen: _InitStep | None = None
+        for step in waiting:
+            refers = isinstance(step.action.content, _PLACED_BESIDE)
+            needs = set(entity_references(step.action.content)) - {step.placed} if refers else set[str]()
+            if id(step.owner) not in held and not any(unplaced[name] for name in needs):
+                chosen = step
                 break
-        # The last one waiting goes on even so: a ring of references has no good order.
-        chosen = private if needs <= placed else waiting[0]
+            held |= set() if step.owner is None else {id(step.owner)}
+        if chosen is None:
+            chosen = waiting[0]
+            what = "the places of the init refer to each other in a ring: the file's order holds"
+            simulation.note(what, chosen.action.place, is_doubt=True)
         waiting.remove(chosen)
-        if chosen.entity_ref not in {other.entity_ref for other in waiting}:
-            placed.add(chosen.entity_ref)
+        unplaced[chosen.placed] -= 1
         yield chosen
-
-
-def _references(private: read.Private) -> set[str]:
-    names = (
-        reference_of(action.content.position)
-        for action in private.actions
-        if isinstance(action.content, TeleportAction)
-    )
-    return {name for name in names if name is not None}
 
 
 def _act(act: read.Act, simulation: Simulation) -> StoryboardElement:

@@ -113,10 +113,19 @@ class RoadNetwork(SurfaceIndex, Routes):
         return lane in self.roads[road].section_at(s).by_id
 
     def lane_at(
-        self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
+        self,
+        road: int,
+        s: float,
+        t: float,
+        *,
+        lane_types: Collection[str] | None = DRIVING,
+        prefer: int | None = None,
     ) -> LaneCoordinates:
-        """The lane of these types that holds `t`, else the nearest; lane 0 if the road has none of them there. [m]"""
-        return lane_at(self.roads[road], road, s, t, lane_types)
+        """The lane of these types that holds `t`, else the nearest; at the edge of two the lane `prefer`. [m]
+
+        Lane 0 if the road has none of them there.
+        """
+        return lane_at(self.roads[road], road, s, t, lane_types, prefer=prefer)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""

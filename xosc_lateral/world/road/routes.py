@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from heapq import heappop, heappush
-from itertools import pairwise
+from itertools import count, pairwise
 from math import inf
+from typing import NamedTuple
 
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import End, Links, follow_section
-from xosc_lateral.world.road.positions import RoadPath, RouteStep
-from xosc_lateral.world.road.road import Road
+from xosc_lateral.world.road.links import End, Links
+from xosc_lateral.world.road.positions import LaneLink, RoadPath, RouteStep
 
 
 class Routes(Links):
@@ -77,7 +77,8 @@ class Routes(Links):
         """Shortest drivable way over roads and junctions between two (road, lane, s). [m]
 
         Every stop is left in the direction `ways` (+1 along s, -1 against s), or in its lane's travel direction; where
-        the lane itself leads on, no lanes are changed. None: there is none.
+        the lane itself leads on, no lanes are changed. Of several ways over the same roads (those inside junctions
+        aside), it is the one onto the lane of the next stop. None: there is none.
         """
         steps: list[RouteStep] = []
         stops = [start, *via, end]
@@ -88,7 +89,9 @@ class Routes(Links):
             if leg is None:
                 return None
             if steps and steps[-1].road == leg[0].road and steps[-1].direction == leg[0].direction:
-                leg = (leg[0]._replace(s_start=steps.pop().s_start), *leg[1:])
+                before = steps.pop()
+                links, missed = (*before.links, *leg[0].links), before.missed or leg[0].missed
+                leg = (leg[0]._replace(s_start=before.s_start, links=links, missed=missed), *leg[1:])
             steps += leg
         return tuple(steps)
 
@@ -96,66 +99,105 @@ class Routes(Links):
         self, start: tuple[int, int, float], end: tuple[int, int, float], way: int
     ) -> tuple[RouteStep, ...] | None:
         """The shortest way that the lane itself leads along, as who drives there changes no lanes; else any way."""
-        (road, lane, s), (target, _, target_s) = start, end
-        if road == target and (target_s - s) * way >= 0.0:
-            return (RouteStep(road, way, s, target_s),)
+        (road, lane, s), (target, wanted, target_s) = start, end
+        goal = target, self.roads[target].section_number(target_s), target_s
         for own_lane in (lane, None):
-            path = self._shortest_way((road, way), own_lane, target, s)
-            if path is not None:
-                steps = [RouteStep(road, way, s, self.roads[road].length if way > 0 else 0.0)]
-                for index, entry in path:
-                    length = self.roads[index].length
-                    steps.append(RouteStep(index, entry, *((0.0, length) if entry > 0 else (length, 0.0))))
-                steps[-1] = steps[-1]._replace(s_end=target_s)
-                return tuple(steps)
+            begin = _Stretch(road, self.roads[road].section_number(s), own_lane, way)
+            found = self._shortest_way(begin, s, goal)
+            if found is not None and own_lane is not None and found[-1].lane != wanted:
+                found = self._shortest_way(begin, s, goal, wanted, self._outside_junctions(found)) or found
+            if found is not None:
+                return self._steps_of(found, s, target_s, 0 if found[-1].lane == wanted else wanted)
         return None
 
-    def _shortest_way(self, start: End, lane: int | None, target: int, s: float) -> tuple[End, ...] | None:
-        """Roads from a place to another road, on a lane and those it leads into; None: lanes may be changed."""
-        road, way = start
-        room = self.roads[road].length - s if way > 0 else s
-        queue: list[tuple[float, int, End, int | None, tuple[End, ...]]] = []
-        count = 0
-        for following, onto in self._drivable(start, lane, s):
-            heappush(queue, (room, count, following, onto, (following,)))
-            count += 1
-        done: set[tuple[End, int | None]] = set()
-        while queue:
-            length, _, here, on, path = heappop(queue)
-            if (here, on) in done:
-                continue
-            done.add((here, on))
-            if here[0] == target:
-                return path
-            for following, onto in self._drivable(here, on):
-                if (following, onto) not in done:
-                    count += 1
-                    heappush(queue, (length + self.roads[here[0]].length, count, following, onto, (*path, following)))
-        return None
+    def _outside_junctions(self, way: _Way) -> list[int]:
+        return [each.road for each in way if each.is_entry and self.roads[each.road].junction is None]
 
-    def _drivable(self, here: End, lane: int | None, s: float | None = None) -> Iterator[tuple[End, int | None]]:
-        """Road ends, and lanes there, that a lane leads to; without one those that any driving lane of its way does."""
-        road, way = here
-        section = self.roads[road].sections[-1 if way > 0 else 0]
-        reached: dict[tuple[End, int | None], None] = {}
-        if lane is None:
-            leaving = [way_out.id for way_out in section.lanes if way_out.type in DRIVING and way_out.direction == way]
-        else:
-            leaving = [found for found in (_at_end(self.roads[road], way, lane, s),) if found is not None]
-        for way_out in leaving:
-            for link in self.next_lanes(road, way_out, way):
-                reached[(link.road, link.direction), None if lane is None else link.lane] = None
-        yield from reached
+    def _shortest_way(
+        self,
+        begin: _Stretch,
+        s: float,
+        goal: tuple[int, int, float],
+        wanted: int | None = None,
+        only: Sequence[int] | None = None,
+    ) -> _Way | None:
+        """Lane sections from a place to one of another place, on a lane and those it leads into; without one, on any.
+
+        Onto the lane `wanted`, and over the roads `only` in their order, those inside junctions aside.
+        """
+        target, number, target_s = goal
+        here = self.roads[begin.road].sections[begin.section]
+        if begin[:2] == (target, number) and (target_s - s) * begin.way >= 0.0 and wanted in (None, begin.lane):
+            return (begin,)
+        queue: list[tuple[float, int, int, _Way]] = []
+        done: set[tuple[tuple[object, ...], int]] = set()
+        numbers = count()
+        length, passed = here.end - s if begin.way > 0 else s - here.start, 0
+        way: _Way = (begin,)
+        while True:
+            for onto in self._drivable(way[-1]):
+                outside = onto.is_entry and self.roads[onto.road].junction is None
+                if not outside or only is None or only[passed : passed + 1] == [onto.road]:
+                    heappush(queue, (length, next(numbers), passed + outside, (*way, onto)))
+            while True:
+                if not queue:
+                    return None
+                length, _, passed, way = heappop(queue)
+                if (way[-1][:4], passed) not in done:
+                    break
+            here_on = way[-1]
+            done.add((here_on[:4], passed))
+            if here_on[:2] == (target, number) and wanted in (None, here_on.lane):
+                return way
+            section = self.roads[here_on.road].sections[here_on.section]
+            length += section.end - section.start
+
+    def _drivable(self, here: _Stretch) -> Iterator[_Stretch]:
+        """What a lane leads to, ended ones included; without a lane, what any driving lane of its way does."""
+        road, number, lane, way = here[:4]
+        section = self.roads[road].sections[number]
+        leaves = not self._is_inside(road, number + way)
+        if lane is not None:
+            links = self.onward(road, number, lane, way)
+            if not links and lane in section.by_id:
+                t = section.by_id[lane].state_at(section.end if way > 0 else section.start).centre_t
+                beyond = self.beyond_end(road, number, lane, way, t, DRIVING)
+                links = () if beyond is None else (beyond,)
+            for link in links:
+                onto = self.entered(road, number, way, link)
+                yield _Stretch(link.road, onto, link.lane, link.direction, link, leaves)
+            return
+        if not leaves:
+            yield _Stretch(road, number + way, None, way)
+            return
+        lanes = [each.id for each in section.lanes if each.type in DRIVING and each.direction == way]
+        for link in dict.fromkeys(link for each in lanes for link in self.onward(road, number, each, way)):
+            yield _Stretch(link.road, self.entered(road, number, way, link), None, link.direction, None, True)
+
+    def _steps_of(self, way: _Way, s: float, target_s: float, missed: int) -> tuple[RouteStep, ...]:
+        """Road by road."""
+        steps: list[RouteStep] = []
+        for on in way:
+            length = self.roads[on.road].length
+            links = () if on.link is None else (on.link,)
+            if on.is_entry or not steps:
+                steps.append(RouteStep(on.road, on.way, *((0.0, length) if on.way > 0 else (length, 0.0)), links))
+            else:
+                steps[-1] = steps[-1]._replace(links=(*steps[-1].links, *links))
+        steps[0] = steps[0]._replace(s_start=s)
+        steps[-1] = steps[-1]._replace(s_end=target_s, missed=missed)
+        return tuple(steps)
 
 
-def _at_end(road: Road, way: int, lane: int, s: float | None) -> int | None:
-    """What a lane has become where the road is left; None if it ends before."""
-    sections = list(road.sections)[::way]
-    if s is not None:
-        sections = sections[sections.index(road.section_at(s)) :]
-    for section, beyond in pairwise(sections):
-        onward = follow_section(road, section, beyond, lane, way)
-        if onward is None:
-            return None
-        lane = onward
-    return lane
+class _Stretch(NamedTuple):
+    """A lane through a section (its number), or any; which way along s, how it is entered, and if with its road."""
+
+    road: int
+    section: int
+    lane: int | None
+    way: int
+    link: LaneLink | None = None
+    is_entry: bool = False
+
+
+_Way = tuple[_Stretch, ...]

@@ -6,7 +6,7 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import AtOnce, Domain, Maker, RunningPrivateAction, at_once
 from xosc_lateral.world.player.drive import align_trailers, connect, disconnect
 from xosc_lateral.world.player.positions.resolve import resolve, route_guide
-from xosc_lateral.world.player.state import guide
+from xosc_lateral.world.player.state import RouteGuide, guide
 from xosc_lateral.world.scenario import global_actions, private_actions
 from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.enums import RouteStrategy
@@ -115,6 +115,8 @@ def assign_route(content: private_actions.AssignRouteAction, action: AtOnce) -> 
     action.actor.route = route_guide(content.route, action.simulation)
     if action.actor.route is None:
         action.note(f"no way leads along route '{content.route.name}': it is not followed")
+    else:
+        note_missed(action, action.actor.route)
 
 
 def acquire_position(content: private_actions.AcquirePositionAction, action: AtOnce) -> None:
@@ -124,6 +126,16 @@ def acquire_position(content: private_actions.AcquirePositionAction, action: AtO
     state.route = guide(state.network, [state.place, resolve(content.position, action.simulation)])
     if state.route is None:
         action.note("no way leads to the position: it is not acquired")
+    else:
+        note_missed(action, state.route)
+
+
+def note_missed(action: AtOnce, route: RouteGuide) -> None:
+    """Say where a route needs lane changes: routes decide at junctions, and make none."""
+    for step in route.steps:
+        if step.missed:
+            where = f"lane {step.missed} of road '{route.network.road_ids[step.road]}'"
+            action.note(f"the route leads to {where} by lane changes only, which others have to make")
 
 
 def controller(content: object, action: AtOnce) -> None:
