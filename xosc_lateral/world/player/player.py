@@ -233,6 +233,8 @@ class _Player:
             end_time=float(time[-1]),
             ended_by=ended_by,
             notes=tuple(simulation.notes),
+            doubts=tuple(simulation.doubts),
+            routes=tuple(simulation.routes),
             cut_off=cut_off,
         )
 

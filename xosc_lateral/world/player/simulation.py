@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.world.motion.nominal import Note, PlayedAction
+from xosc_lateral.world.motion.nominal import FollowedRoute, Note, PlayedAction
 from xosc_lateral.world.player.drive import along_reference, beside_line
 from xosc_lateral.world.player.recorder import MAXIMUM_COORDINATE, MAXIMUM_SPEED, Rows
 from xosc_lateral.world.player.state import ACTIVE, EntityState
@@ -140,6 +140,7 @@ class Simulation:
         """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
         self.notes: list[Note] = []
         self.doubts: list[Note] = []
+        self.routes: list[FollowedRoute] = []
         self._noted: set[tuple[str, str, int | None]] = set()
         self.played: list[PlayedAction] = []
         """All actions started so far, in order of start."""
@@ -173,7 +174,8 @@ class Simulation:
         key = (what, place.path, place.line)
         if key not in self._noted:
             self._noted.add(key)
-            (self.doubts if is_doubt else self.notes).append(Note(what, place.path, place.line, place.element))
+            self.notes.append(Note(what, place.path, place.line, place.element))
+            self.doubts += self.notes[-1:] if is_doubt else []
 
     def values_of(self, content: object) -> tuple[Values, str]:
         """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""

@@ -38,6 +38,7 @@ class RouteGuide:
 
     network: RoadNetwork
     steps: tuple[RouteStep, ...]
+    stops: tuple[tuple[int, int, float], ...] = ()  # road, lane, s [m]
 
     def choose(self, road: int, options: Sequence[LaneLink]) -> LaneLink | None:
         """The link that leads along the route, be it by another connecting road; None: the route does not say."""
@@ -97,10 +98,10 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
     """The shortest way over the stops; None: there is none."""
     if len(stops) < 2 or any(stop.road == NO_ROAD for stop in stops):
         return None
-    first, *via, last = [(stop.road, stop.lane, stop.s) for stop in stops]
+    places = [(stop.road, stop.lane, stop.s) for stop in stops]
     ways = [1 if is_forward(stop.relative_heading) else -1 for stop in stops]
-    steps = network.route(first, last, via=via, ways=ways)
-    return None if steps is None else RouteGuide(network, steps)
+    steps = network.route(places[0], places[-1], via=places[1:-1], ways=ways)
+    return None if steps is None else RouteGuide(network, steps, tuple(places))
 
 
 ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long

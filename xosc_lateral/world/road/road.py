@@ -232,7 +232,7 @@ def lane_at(
         centre, _, width = lane.state_at(s)
         away = abs(t - centre)
         outside = max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0)
-        score = (outside if prefer is None else round(outside, 3), lane.id != prefer, away, width)
+        score = (outside if prefer is None else round(outside, 9), lane.id != prefer, away, width)
         if best is None or score < best:
             best, nearest = score, (lane, centre)
     if best is None or nearest is None:
