@@ -28,7 +28,7 @@ def play(
     allow: Paths = (),
     road: PathLike | None = None,
     road_path: Paths = (),
-    strict: Annotated[bool, flag("--strict", help="A missing vehicle catalog, a run cut off or a doubt is an error.")] = False,
+    strict: Annotated[bool, flag("--strict", help="No vehicle catalog, a run cut off, a doubt: an error.")] = False,
 ) -> Playback:  # fmt: skip
     """Play a scenario's maneuvers, without offsets.
 

@@ -10,7 +10,7 @@ from math import inf
 
 import numpy as np
 
-from xosc_lateral.base.arrays import IntArray
+from xosc_lateral.base.arrays import FloatArray, IndexArray, Int32Array
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion, Note
 from xosc_lateral.world.road.lanes import DRIVING
@@ -18,7 +18,7 @@ from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.place import Place
 
 JUMP_DISTANCE, SLANT = 0.05, 1.1
-"""More than this beyond the way of a frame is a jump [m]; a lane that widens or narrows makes the way longer. [-]"""
+"""More than this beyond the way of a frame is a worst [m]; a lane that widens or narrows makes the way longer. [-]"""
 
 HEIGHT_APART = 2.5
 """Entities further apart than this in z are on different levels of the road. [m]"""
@@ -47,7 +47,7 @@ def _note(what: str, place: Place) -> Note:
 
 def _jumps(entity: EntityMotion) -> Iterator[Note]:
     """The first row that is further from the one before than the speed explains, and how many there are."""
-    first, count, jump = -1, 0, 0.0
+    first, count, moved_so, explained = -1, 0, 0.0, 0.0
     for rows in blocks(len(entity.time), 1):
         both = slice(rows.start - 1, rows.stop)
         moved = np.hypot(np.diff(entity.x[both]), np.diff(entity.y[both]))
@@ -56,15 +56,13 @@ def _jumps(entity: EntityMotion) -> Iterator[Note]:
         there = (entity.activity[both] & _PRESENT) != 0
         placed = (entity.activity[rows] & np.uint8(Activity.TELEPORTED)) != 0
         far = np.flatnonzero((moved > SLANT * way + JUMP_DISTANCE) & there[1:] & there[:-1] & ~placed)
-        if len(far):
-            first = rows.start + int(far[0]) if first < 0 else first
-            count, jump = count + len(far), max(jump, float((moved - way)[far].max()))
+        if len(far) and not count:
+            first, moved_so, explained = rows.start + int(far[0]), float(moved[far[0]]), float(way[far[0]])
+        count += len(far)
     if count:
         again = f", {count} times in all" if count > 1 else ""
-        what = (
-            f"'{entity.name}' jumps at {entity.time[first]:.2f} s, {jump:.2f} m further than its speed explains{again}"
-        )
-        yield _note(what, entity.entity.place)
+        when = f"at {entity.time[first]:.2f} s{again}, where its speed explains {explained:.2f} m"
+        yield _note(f"'{entity.name}' jumps by {moved_so:.2f} m {when}", entity.entity.place)
 
 
 def _lanes_for_nobody(entity: EntityMotion, network: RoadNetwork) -> Iterator[Note]:
@@ -122,7 +120,7 @@ def _off_route(
             yield _note(what, route.place)
 
 
-def _changes(values: IntArray) -> IntArray:
+def _changes(values: Int32Array) -> IndexArray:
     """Rows in which an integer column is not as in the row before, the first among them."""
     return np.flatnonzero(np.diff(values, prepend=values[:1] - 1))
 
@@ -156,7 +154,7 @@ def _touch(entity: EntityMotion, other: EntityMotion, row: int) -> bool:
     return True
 
 
-def _corners(entity: EntityMotion, row: int) -> np.ndarray:
+def _corners(entity: EntityMotion, row: int) -> FloatArray:
     """Shape (4, 2). [m]"""
     box, heading = entity.box, entity.heading[row]
     ahead = box.center_x + 0.5 * box.length * np.array([1, -1, -1, 1])
