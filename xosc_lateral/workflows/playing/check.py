@@ -103,7 +103,9 @@ def _off_route(
         road = int(entity.road[k])
         if road < 0 or not entity.activity[k] & _PRESENT or road in roads[at : at + 1]:
             continue
-        if road in roads[at + 1 :]:
+        if entity.activity[k] & np.uint8(Activity.TELEPORTED):
+            at = roads.index(road) if road in roads else len(roads)  # put there by the file
+        elif road in roads[at + 1 :]:
             at += 1 + roads[at + 1 :].index(road)
         elif network.roads[road].junction is None and 0 <= at < len(roads) - 1:
             where = f"on road '{network.road_ids[road]}', at {entity.time[k]:.2f} s"
