@@ -180,6 +180,7 @@ class RunningLaneOffset(RunningToTarget):
             # The road under the entity now runs the other way, and so does its +t.
             transition.start, transition.target = -transition.start, -transition.target
             self._forward = state.is_forward
+        state.speed_taken |= abs(state.speed) < EPSILON  # who stands does not drive for being moved sideways
         offset = transition.value()
         done = transition.is_done or abs(offset - transition.target) < EPSILON
         along = 0.0 if state.is_forward else pi
