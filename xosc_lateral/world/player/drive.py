@@ -144,14 +144,15 @@ def _leave_narrow_lane(state: EntityState) -> None:
     network = state.network
     if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
         return
-    t, kept = state.t, state.kept_types()
-    nearest, lane_id = inf, 0
-    for lane in network.lanes_at(state.road, state.s):
-        away = abs(lane.centre_t - t) - 0.5 * lane.width
-        if lane.width >= EPSILON and lane.type in kept and lane.id * state.lane > 0 and away < nearest:
-            nearest, lane_id = away, lane.id
-    if lane_id:
-        state.move_to(state.road, lane_id, state.s, 0.0)
+    lane = network.lane_at(
+        state.road,
+        state.s,
+        state.t,
+        lane_types=state.kept_types(),
+        direction=network.travel_direction(state.road, state.lane),
+    ).lane
+    if lane and network.lane_state_at(state.road, lane, state.s).width >= EPSILON:
+        state.move_to(state.road, lane, state.s, 0.0)
 
 
 def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:

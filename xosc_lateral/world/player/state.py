@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import cos, nan, pi, sin
 from typing import NamedTuple, Protocol
@@ -69,19 +69,17 @@ class RouteGuide:
 
     def way_to(self, here: tuple[int, float], there: tuple[int, float]) -> float | None:
         """Way along the route from a road and s to a later one; None: they don't lie on it so. [m]"""
-        left: float | None = None
+        ways = [end - start for start in self._passes(*here) for end in self._passes(*there) if end >= start]
+        return min(ways, default=None)
+
+    def _passes(self, road: int, s: float) -> Iterator[float]:
+        """How far along the route a place lies; for every time that it is passed. [m]"""
+        before = 0.0
         for step in self.steps:
-            for road, s in (here, there):
-                into, length = (s - step.s_start) * step.direction, abs(step.s_end - step.s_start)
-                if road != step.road or not 0.0 <= into <= length:
-                    continue
-                if (road, s) == here and left is None:
-                    left = -into
-                elif (road, s) == there and left is not None and left + into >= 0.0:
-                    return left + into
-            if left is not None:
-                left += abs(step.s_end - step.s_start)
-        return None
+            into, length = (s - step.s_start) * step.direction, abs(step.s_end - step.s_start)
+            if road == step.road and 0.0 <= into <= length:
+                yield before + into
+            before += length
 
     def at(self, path_s: float) -> tuple[int, float, int]:
         """Road, s and direction after `path_s` metres of the route; its end beyond it. [m]"""

@@ -14,6 +14,9 @@ End = tuple[int, int]
 """A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""
 
 
+Pairs = tuple[tuple[int, int], ...]
+"""Lanes before a joint and those that they lead to."""
+
 Chooser = Callable[[Sequence[LaneLink]], LaneLink]
 """Picks one of several ways on; gets at least one."""
 
@@ -68,20 +71,44 @@ class Links:
             for target in _lanes_beyond(here, lane_here, way, s, joint, _named_by(lane_here, way), unsaid):
                 yield LaneLink(road, target, s, way)
             return
+        found = False
+        for other, contact, pairs, is_back in self._joints(road, way) if lane else ():
+            if is_back and found:
+                return
+            named = _named_by(lane_here, way) if pairs is None else [to for source, to in pairs if source == lane]
+            if pairs and not named:
+                continue
+            there, (s, entry) = self.roads[other], (0.0, 1) if contact == "start" else (self.roads[other].length, -1)
+            joint = _Joint(there, there.sections[0 if entry > 0 else -1], s, entry)
+            for target in _lanes_beyond(here, lane_here, way, here.length if way > 0 else 0.0, joint, named):
+                found = not is_back
+                yield LaneLink(other, target, s, entry)
+
+    def _joints(self, road: int, way: int) -> Iterator[tuple[int, str, Pairs | None, bool]]:
+        """Roads beyond an end: index, where it is touched, lanes (None: as they say), whether by its own link only.
+
+        A connection without lanes leads to those that name the lane as their own link.
+        """
+        here = self.roads[road]
         link = here.successor if way > 0 else here.predecessor
-        if link is None or lane == 0:
+        if link is not None and link.element_type != "junction":
+            other = self._index.get(link.element_id)
+            if other is not None:
+                yield other, link.contact or self._contact_of(road, way, other), None, False
             return
-        if link.element_type == "junction":
-            onward = [
-                *self._through_junction(here, lane_here, link, way),
-                *self._back_through_direct_junction(here, lane_here, link, way),
-            ]
-            yield from onward or self._against_traffic(here, lane_here, link, way)
+        junction = None if link is None else self.junctions.get(link.element_id)
+        for connection in junction.connections if junction else ():
+            other = self._index.get(connection.connecting_road)
+            if connection.incoming_road == here.id and other is not None:
+                yield other, connection.contact or "start", connection.lanes, False
+        if link is None:
             return
-        other = self._index.get(link.element_id)
-        if other is not None:
-            contact = link.contact or self._contact_of(road, way, other)
-            yield from self._enter(here, lane_here, way, other, contact, _named_by(lane_here, way))
+        # Direct junctions have no connecting roads whose own links lead back: their connections hold both ways.
+        for connection, other, contact in self._direct_connections(here, link, way):
+            yield other, contact, tuple((target, source) for source, target in connection.lanes), False
+        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
+        for other, contact in self._roads_back(here, link.element_id, way):
+            yield other, contact, (), True
 
     def beyond_end(
         self, road: int, section: int, lane: int, way: int, t: float, lane_types: Collection[str]
@@ -106,27 +133,6 @@ class Links:
         )
         return LaneLink(other, beyond.lane, s, entry) if beyond.lane else None
 
-    def _through_junction(self, here: Road, lane: Lane, link: RoadLink, way: int) -> Iterator[LaneLink]:
-        junction = self.junctions.get(link.element_id)
-        for connection in junction.connections if junction else ():
-            other = self._index.get(connection.connecting_road)
-            if connection.incoming_road == here.id and other is not None:
-                named = [to for source, to in connection.lanes if source == lane.id]
-                if named or not connection.lanes:  # without lane links: those that name the lane as their own link
-                    yield from self._enter(here, lane, way, other, connection.contact or "start", named)
-
-    def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, way: int) -> Iterator[LaneLink]:
-        """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
-        for other, contact in self._roads_back(here, link.element_id, way):
-            yield from self._enter(here, lane, way, other, contact, ())
-
-    def _back_through_direct_junction(self, here: Road, lane: Lane, link: RoadLink, way: int) -> Iterator[LaneLink]:
-        """Direct junctions have no connecting roads whose own links lead back: their connections hold both ways."""
-        for connection, other, contact in self._direct_connections(here, link, way):
-            named = [source for source, target in connection.lanes if target == lane.id]
-            if named:
-                yield from self._enter(here, lane, way, other, contact, named)
-
     def _direct_connections(self, here: Road, link: RoadLink, direction: int) -> Iterator[tuple[Connection, int, str]]:
         """Connections of a direct junction that end where this road is left; incoming road, and its end there."""
         junction = self.junctions.get(link.element_id)
@@ -148,43 +154,15 @@ class Links:
         to_start, to_end = ((u - x) ** 2 + (v - y) ** 2 for u, v, _ in ends)
         return "start" if to_start <= to_end else "end"
 
-    def _enter(
-        self, here: Road, lane: Lane, way: int, other: int, contact: str, named: Sequence[int]
-    ) -> Iterator[LaneLink]:
-        """Onto another road by one of its ends."""
-        there = self.roads[other]
-        s, entry = (0.0, 1) if contact == "start" else (there.length, -1)
-        joint = _Joint(there, there.sections[0 if entry > 0 else -1], s, entry)
-        for target in _lanes_beyond(here, lane, way, here.length if way > 0 else 0.0, joint, named):
-            yield LaneLink(other, target, s, entry)
-
     def next_roads(self, road: int, direction: int) -> tuple[End, ...]:
         """Roads that can be entered when leaving this one at its end (+1) or start (-1), driven there either way."""
         key = (road, direction)
         if key not in self._ends:
-            self._ends[key] = tuple(dict.fromkeys(self._find_roads(road, direction)))
+            joints = self._joints(road, direction)
+            self._ends[key] = tuple(
+                dict.fromkeys((other, 1 if contact == "start" else -1) for other, contact, *_ in joints)
+            )
         return self._ends[key]
-
-    def _find_roads(self, road: int, direction: int) -> Iterator[End]:
-        here = self.roads[road]
-        link = here.successor if direction > 0 else here.predecessor
-        if link is None:
-            return
-        if link.element_type != "junction":
-            other = self._index.get(link.element_id)
-            if other is not None:
-                yield other, 1 if (link.contact or self._contact_of(road, direction, other)) == "start" else -1
-            return
-        junction = self.junctions.get(link.element_id)
-        for connection in junction.connections if junction else ():
-            other = self._index.get(connection.connecting_road)
-            if connection.incoming_road == here.id and other is not None:
-                yield other, 1 if connection.contact != "end" else -1
-        for _, other, contact in self._direct_connections(here, link, direction):
-            yield other, 1 if contact == "start" else -1
-        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
-        for other, contact in self._roads_back(here, link.element_id, direction):
-            yield other, 1 if contact == "start" else -1
 
     def _roads_back(self, here: Road, junction: str, direction: int) -> Iterator[tuple[int, str]]:
         """Roads of a junction that lead to this one's end (+1) or start (-1) by their own links, and by which end."""

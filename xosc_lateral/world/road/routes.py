@@ -7,15 +7,17 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from heapq import heappop, heappush
 from itertools import count, pairwise
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import End, Links
+from xosc_lateral.world.road.links import Links
 from xosc_lateral.world.road.positions import LaneLink, RoadPath, RouteStep
+
+_Node = TypeVar("_Node")
 
 
 class Routes(Links):
@@ -34,37 +36,19 @@ class Routes(Links):
         if road == target:
             best = RoadPath((target_s - s) * direction, 1 if target_s >= s else -1, ())
         for way in (1, -1):
-            room = self.roads[road].length - s if way > 0 else s
-            reach = min(limit, abs(best.ds) if best is not None else inf)
-            steps = self._search(road, way, room, target, target_s, reach)
-            if steps is not None and (best is None or steps[0] < abs(best.ds)):
-                best = RoadPath(steps[0] * way * direction, way, steps[1])
+            found = _shortest(
+                self.next_roads(road, way),
+                self.roads[road].length - s if way > 0 else s,
+                lambda end: self.next_roads(*end),
+                lambda end: self.roads[end[0]].length,
+                lambda end: (
+                    None if end[0] != target else target_s if end[1] > 0 else self.roads[target].length - target_s
+                ),
+                min(limit, abs(best.ds) if best is not None else inf),
+            )
+            if found is not None and (best is None or found[0] < abs(best.ds)):
+                best = RoadPath(found[0] * way * direction, way, found[1])
         return best if best is not None and abs(best.ds) <= limit else None
-
-    def _search(
-        self, road: int, way: int, room: float, target: int, target_s: float, limit: float
-    ) -> tuple[float, tuple[End, ...]] | None:
-        """Dijkstra over road ends: length to `target_s` on `target`, leaving `road` in direction `way`, and the way."""
-        queue: list[tuple[float, End, tuple[End, ...]]] = [(room, end, (end,)) for end in self.next_roads(road, way)]
-        done: set[End] = set()
-        queue.sort()
-        best: tuple[float, tuple[End, ...]] | None = None
-        while queue:
-            length, end, path = heappop(queue)
-            if length > limit or (best is not None and length >= best[0]):
-                break
-            if end in done:
-                continue
-            done.add(end)
-            index, entry = end
-            if index == target:
-                arrival = length + (target_s if entry > 0 else self.roads[index].length - target_s)
-                if best is None or arrival < best[0]:
-                    best = arrival, path
-            for following in self.next_roads(index, entry):
-                if following not in done:
-                    heappush(queue, (length + self.roads[index].length, following, (*path, following)))
-        return best
 
     def route(
         self,
@@ -126,53 +110,46 @@ class Routes(Links):
         Onto the lane `wanted`, and over the roads `only` in their order, those inside junctions aside.
         """
         target, number, target_s = goal
-        here = self.roads[begin.road].sections[begin.section]
-        if begin[:2] == (target, number) and (target_s - s) * begin.way >= 0.0 and wanted in (None, begin.lane):
-            return (begin,)
-        queue: list[tuple[float, int, int, _Way]] = []
-        done: set[tuple[tuple[object, ...], int]] = set()
-        numbers = count()
-        length, passed = here.end - s if begin.way > 0 else s - here.start, 0
-        way: _Way = (begin,)
-        while True:
-            for onto in self._drivable(way[-1]):
-                outside = onto.is_entry and self.roads[onto.road].junction is None
-                if not outside or only is None or only[passed : passed + 1] == [onto.road]:
-                    heappush(queue, (length, next(numbers), passed + outside, (*way, onto)))
-            while True:
-                if not queue:
-                    return None
-                length, _, passed, way = heappop(queue)
-                if (way[-1][:4], passed) not in done:
-                    break
-            here_on = way[-1]
-            done.add((here_on[:4], passed))
-            if here_on[:2] == (target, number) and wanted in (None, here_on.lane):
-                return way
-            section = self.roads[here_on.road].sections[here_on.section]
-            length += section.end - section.start
 
-    def _drivable(self, here: _Stretch) -> Iterator[_Stretch]:
+        def edge(on: _Stretch, way: int) -> float:
+            section = self.roads[on.road].sections[on.section]
+            return section.end if way > 0 else section.start
+
+        def onward(on: _Stretch) -> Iterator[_Stretch]:
+            for onto in self._drivable(on):
+                outside = onto.is_entry and self.roads[onto.road].junction is None
+                if not outside or only is None or only[on.passed : on.passed + 1] == [onto.road]:
+                    yield onto._replace(passed=on.passed + outside)
+
+        def arrival(on: _Stretch) -> float | None:
+            there = on[:2] == (target, number) and wanted in (None, on.lane)
+            return abs(target_s - edge(on, -on.way)) if there else None
+
+        if arrival(begin) is not None and (target_s - s) * begin.way >= 0.0:
+            return (begin,)
+        room = abs(edge(begin, begin.way) - s)
+        found = _shortest(onward(begin), room, onward, lambda on: abs(edge(on, 1) - edge(on, -1)), arrival)
+        return None if found is None else (begin, *found[1])
+
+    def _drivable(self, on: _Stretch) -> Iterator[_Stretch]:
         """What a lane leads to, ended ones included; without a lane, what any driving lane of its way does."""
-        road, number, lane, way = here[:4]
+        road, number, lane, way = on[:4]
         section = self.roads[road].sections[number]
         leaves = not self._is_inside(road, number + way)
-        if lane is not None:
-            links = self.onward(road, number, lane, way)
-            if not links and lane in section.by_id:
-                t = section.by_id[lane].state_at(section.end if way > 0 else section.start).centre_t
-                beyond = self.beyond_end(road, number, lane, way, t, DRIVING)
-                links = () if beyond is None else (beyond,)
-            for link in links:
-                onto = self.entered(road, number, way, link)
-                yield _Stretch(link.road, onto, link.lane, link.direction, link, leaves)
-            return
-        if not leaves:
+        if lane is None and not leaves:
             yield _Stretch(road, number + way, None, way)
             return
         lanes = [each.id for each in section.lanes if each.type in DRIVING and each.direction == way]
-        for link in dict.fromkeys(link for each in lanes for link in self.onward(road, number, each, way)):
-            yield _Stretch(link.road, self.entered(road, number, way, link), None, link.direction, None, True)
+        for each in lanes if lane is None else (lane,):
+            links = self.onward(road, number, each, way)
+            if not links and lane in section.by_id:
+                t = section.by_id[each].state_at(section.end if way > 0 else section.start).centre_t
+                beyond = self.beyond_end(road, number, each, way, t, DRIVING)
+                links = () if beyond is None else (beyond,)
+            for link in links:
+                onto = self.entered(road, number, way, link)
+                tracked = (None, None) if lane is None else (link.lane, link)
+                yield _Stretch(link.road, onto, tracked[0], link.direction, tracked[1], leaves)
 
     def _steps_of(self, way: _Way, s: float, target_s: float, missed: int) -> tuple[RouteStep, ...]:
         """Road by road."""
@@ -198,6 +175,39 @@ class _Stretch(NamedTuple):
     way: int
     link: LaneLink | None = None
     is_entry: bool = False
+    passed: int = 0  # roads entered so far outside of junctions
 
 
 _Way = tuple[_Stretch, ...]
+
+
+def _shortest(
+    first: Iterable[_Node],
+    room: float,
+    onward: Callable[[_Node], Iterable[_Node]],
+    length: Callable[[_Node], float],
+    arrival: Callable[[_Node], float | None],
+    limit: float = inf,
+) -> tuple[float, tuple[_Node, ...]] | None:
+    """Shortest way from one of the nodes `first`, which are `room` away, and its length [m]; None: none within `limit`.
+
+    `arrival`: how far into a node the goal is; None: it is not there.
+    """
+    queue: list[tuple[float, int, _Node, tuple[_Node, ...]]]
+    queue = [(room, number, node, (node,)) for number, node in enumerate(first)]
+    numbers, done = count(len(queue)), set[_Node]()
+    best: tuple[float, tuple[_Node, ...]] | None = None
+    while queue:
+        so_far, _, node, path = heappop(queue)
+        if so_far > limit or (best is not None and so_far >= best[0]):
+            break
+        if node in done:
+            continue
+        done.add(node)
+        rest = arrival(node)
+        if rest is not None and (best is None or so_far + rest < best[0]):
+            best = so_far + rest, path
+        for onto in onward(node):
+            if onto not in done:
+                heappush(queue, (so_far + length(node), next(numbers), onto, (*path, onto)))
+    return best
