@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from xosc_lateral.world.player.actions import (
     at_once,
@@ -59,51 +58,49 @@ def init_actions(init: read.Init, simulation: Simulation) -> list[RunningAction]
     """Init actions in the order in which they start.
 
     They are a set: what is placed relative to an entity comes after all that places that one, global or private. Those
-    of one ``Private`` stay in order.
+    of one ``Private`` stay in order, and together where they can.
     """
-    steps = [_InitStep(action, None) for action in (*init.global_actions, *init.user_defined_actions)]
-    steps += [_InitStep(action, private) for private in init.privates for action in private.actions]
+    rows: list[list[_InitStep]] = [[(action, None)] for action in (*init.global_actions, *init.user_defined_actions)]
+    rows += [[(action, private) for action in private.actions] for private in init.privates]
     return [
         prepare_action(action, None if owner is None else simulation.actor(owner.entity_ref, owner.place), simulation)
-        for action, owner in _in_order(steps, simulation)
+        for action, owner in _in_order([row for row in rows if row], simulation)
     ]
 
 
-class _InitStep(NamedTuple):
-    action: read.Action
-    owner: read.Private | None
-
-    @property
-    def placed(self) -> str:
-        """The entity that it puts somewhere; empty: none."""
-        if self.owner is not None:
-            return self.owner.entity_ref if isinstance(self.action.content, TeleportAction) else ""
-        return self.action.content.entity_ref if isinstance(self.action.content, AddEntityAction) else ""
-
+_InitStep = tuple[read.Action, read.Private | None]
+"""An action, and whose it is; None: global."""
 
 _PLACED_BESIDE = (TeleportAction, AddEntityAction, FollowTrajectoryAction, LaneChangeAction, LaneOffsetAction)
 """Actions that look at once where the entities are that they refer to."""
 
 
-def _in_order(steps: list[_InitStep], simulation: Simulation) -> Iterator[_InitStep]:
-    waiting, unplaced = list(steps), Counter(step.placed for step in steps)
-    while waiting:
-        held = set[int]()  # owners of whom an earlier action waits
-        chosen: _InitStep | None = None
-        for step in waiting:
-            refers = isinstance(step.action.content, _PLACED_BESIDE)
-            needs = set(entity_references(step.action.content)) - {step.placed} if refers else set[str]()
-            if id(step.owner) not in held and not any(unplaced[name] for name in needs):
-                chosen = step
-                break
-            held |= set() if step.owner is None else {id(step.owner)}
-        if chosen is None:
-            chosen = waiting[0]
+def _in_order(rows: list[list[_InitStep]], simulation: Simulation) -> Iterator[_InitStep]:
+    """Rows of actions that start one after the other, the first row that can begin or go on first."""
+    unplaced = Counter(_placed(step) for row in rows for step in row)
+    while rows:
+        k = next((k for k, row in enumerate(rows) if not any(unplaced[name] for name in _needs(row[0]))), None)
+        if k is None:
             what = "the places of the init refer to each other in a ring: the file's order holds"
-            simulation.note(what, chosen.action.place, is_doubt=True)
-        waiting.remove(chosen)
-        unplaced[chosen.placed] -= 1
-        yield chosen
+            simulation.note(what, rows[0][0][0].place, is_doubt=True)
+        row = rows.pop(k or 0)
+        unplaced[_placed(row[0])] -= 1
+        yield row.pop(0)
+        rows[:0] = [row] if row else []
+
+
+def _placed(step: _InitStep) -> str:
+    """The entity that an action puts somewhere; empty: none."""
+    content, owner = step[0].content, step[1]
+    if owner is not None:
+        return owner.entity_ref if isinstance(content, TeleportAction) else ""
+    return content.entity_ref if isinstance(content, AddEntityAction) else ""
+
+
+def _needs(step: _InitStep) -> set[str]:
+    """Entities that have to be somewhere before an action starts."""
+    content = step[0].content
+    return set(entity_references(content)) - {_placed(step)} if isinstance(content, _PLACED_BESIDE) else set()
 
 
 def _act(act: read.Act, simulation: Simulation) -> StoryboardElement:
