@@ -57,12 +57,16 @@ def test_who_drives_along_a_lane_gives_no_doubt(network: RoadNetwork) -> None:
 
 
 def test_a_jump_aside_is_named_with_its_time_but_for_who_is_placed_anew(network: RoadNetwork) -> None:
-    y = np.where(TIME < 2.95, -1.75, 0.0)
+    y = np.where(TIME < 2.95, -1.75, 0.6)
     (what,) = said(network, car(y=y))
-    assert what.startswith("'A' jumps by 2.66 m at 3.00 s")
+    assert what.startswith("'A' jumps 3.1 m at 3.00 s, further than its speed explains")
     placed = np.full(len(TIME), Activity.ACTIVE, dtype=np.uint8)
     placed[30] |= Activity.TELEPORTED
     assert not said(network, car(y=y, activity=placed))
+
+
+def test_no_lateral_action_is_a_jump(network: RoadNetwork) -> None:
+    assert not said(network, car(y=-1.75 + np.clip(9.0 * (TIME - 2.0), 0.0, 3.5)))
 
 
 def test_a_slanting_way_is_no_jump(network: RoadNetwork) -> None:

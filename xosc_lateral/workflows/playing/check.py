@@ -10,15 +10,18 @@ from math import inf
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IndexArray, Int32Array
-from xosc_lateral.base.rows import blocks
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array
+from xosc_lateral.base.rows import blocks, rows_where
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion, Note
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.place import Place
 
-JUMP_DISTANCE, SLANT = 0.05, 1.1
-"""More than this beyond the way of a frame is a worst [m]; a lane that widens or narrows makes the way longer. [-]"""
+LEAP_DISTANCE = 0.3
+"""Further than who drives and slides aside at `MAXIMUM_LATERAL_SPEED`, and aside by this much more: a leap. [m]"""
+
+MAXIMUM_LATERAL_SPEED = 10.0
+"""No lateral action is faster. [m/s]"""
 
 HEIGHT_APART = 2.5
 """Entities further apart than this in z are on different levels of the road. [m]"""
@@ -46,23 +49,31 @@ def _note(what: str, place: Place) -> Note:
 
 
 def _jumps(entity: EntityMotion) -> Iterator[Note]:
-    """The first row that is further from the one before than the speed explains, and how many there are."""
-    first, count, moved_so, explained = -1, 0, 0.0, 0.0
-    for rows in blocks(len(entity.time), 1):
-        both = slice(rows.start - 1, rows.stop)
-        moved = np.hypot(np.diff(entity.x[both]), np.diff(entity.y[both]))
-        speed = np.abs(entity.speed[both])
-        way = np.maximum(speed[1:], speed[:-1]) * np.diff(entity.time[both])
-        there = (entity.activity[both] & _PRESENT) != 0
-        placed = (entity.activity[rows] & np.uint8(Activity.TELEPORTED)) != 0
-        far = np.flatnonzero((moved > SLANT * way + JUMP_DISTANCE) & there[1:] & there[:-1] & ~placed)
-        if len(far) and not count:
-            first, moved_so, explained = rows.start + int(far[0]), float(moved[far[0]]), float(way[far[0]])
-        count += len(far)
-    if count:
-        again = f", {count} times in all" if count > 1 else ""
-        when = f"at {entity.time[first]:.2f} s{again}, where its speed explains {explained:.2f} m"
-        yield _note(f"'{entity.name}' jumps by {moved_so:.2f} m {when}", entity.entity.place)
+    """The first jump that nobody asked for, and how many there are."""
+    found = leaps(entity)
+    if found:
+        (time, length), more = found[0], f" ({len(found)} times in all)" if len(found) > 1 else ""
+        why = "further than its speed explains: the lane that it follows ends, or its road has a gap"
+        yield _note(f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", entity.entity.place)
+
+
+def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
+    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet."""
+
+    def moved(around: slice) -> FloatArray:
+        return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
+
+    def leaps_there(rows: slice) -> BoolArray:
+        around = slice(rows.start - 1, rows.stop)
+        step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
+        active = (activity & Activity.ACTIVE) != 0
+        whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
+        driven = np.maximum(speed[1:], speed[:-1]) * step
+        aside = LEAP_DISTANCE + MAXIMUM_LATERAL_SPEED * step
+        return np.asarray(whole & (moved(around) > np.hypot(driven, aside)))
+
+    leaping = rows_where(len(motion.time), leaps_there, 1)
+    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in leaping]
 
 
 def _lanes_for_nobody(entity: EntityMotion, network: RoadNetwork) -> Iterator[Note]:
