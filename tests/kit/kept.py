@@ -81,7 +81,7 @@ def _ways(network: RoadNetwork, lanes: list[list[int]], s: list[float]) -> Itera
             yield [None if path is None else [path.is_turned, *_plain(path)]]
         if lane and other_lane:
             steps = network.route((road, lane, at), (other, other_lane, there))
-            yield [None if steps is None else [_plain(step) for step in steps]]
+            yield [None if steps is None else [_plain(step[:4]) for step in steps]]
         for distance in (35.0, -60.0, 400.0):
             if lane:
                 yield [_plain(network.advance(road, lane, at, distance))]

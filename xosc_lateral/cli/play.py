@@ -64,7 +64,9 @@ def play(
         for note in played.notes:
             typer.echo(note, err=True)
     warn(played.warnings)
-    if options["strict"] and played.warnings:
+    if options["strict"] and reply.quiet:
+        warn(played.doubts)
+    if options["strict"] and (played.warnings or played.doubts):
         raise typer.Exit(1)
 
 

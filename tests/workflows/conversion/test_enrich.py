@@ -202,14 +202,6 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     assert not calm.warnings()
 
 
-def test_a_nominal_jump_is_told_with_time_and_length(tmp_path: Path) -> None:
-    network = two_roads(tmp_path)
-    whole = drive(network, entity())
-    motion = together(whole.having(y=whole.y + np.where(whole.time < 3.99, 0.0, 1.9)))
-    (warning,) = enrich(SegmentedRun(motion, network), {}, seed=1).warnings()
-    assert warning.startswith("car jumps 2.0 m at 4.0 s, as in the nominal motion: ")
-
-
 def test_who_is_not_enriched_keeps_every_bit_and_the_reason_is_given(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     slow = drive(network, entity("slow"), speed=8.0)

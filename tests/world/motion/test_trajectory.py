@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.motion import RADIUS, drive, entity, two_roads
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.motion.trajectory import displace, distance_driven, leaps
+from xosc_lateral.world.motion.trajectory import displace, distance_driven
 
 
 def _left_of_nominal(motion, path) -> np.ndarray:  # type: ignore[no-untyped-def]
@@ -44,20 +44,6 @@ def test_heading_and_speed_follow_the_shifted_path(tmp_path: Path) -> None:
     path = displace(motion, network, slope * distance_driven(motion))
     np.testing.assert_allclose(path.heading, np.arctan(slope), atol=1e-9)
     np.testing.assert_allclose(path.speed, 30.0 * np.hypot(1.0, slope), rtol=1e-9)
-
-
-def test_a_leap_is_found_where_nobody_is_placed_anew(tmp_path: Path) -> None:
-    motion = drive(two_roads(tmp_path), entity(), start=50.0)
-    assert leaps(motion) == []
-    aside = motion.having(y=motion.y + np.where(motion.time < 3.99, 0.0, 1.9))
-    assert leaps(aside) == [(pytest.approx(4.0), pytest.approx(np.hypot(1.9, 30.0 * 0.02)))]
-    activity = aside.activity | np.where(np.arange(len(motion.time)) == 200, int(Activity.TELEPORTED), 0)
-    assert leaps(aside.having(activity=activity.astype(np.uint8))) == []
-
-
-def test_no_lateral_action_is_a_leap(tmp_path: Path) -> None:
-    motion = drive(two_roads(tmp_path), entity(), start=50.0)
-    assert leaps(motion.having(y=motion.y + np.clip(9.0 * (motion.time - 4.0), 0.0, 3.5))) == []
 
 
 def test_inside_of_a_left_curve_is_driven_slower(tmp_path: Path) -> None:

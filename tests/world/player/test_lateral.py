@@ -131,7 +131,8 @@ def test_a_lane_offset_at_once_is_a_jump_unless_it_is_tiny(tmp_path: Path, offse
 def test_over_several_lanes_the_lane_is_the_one_under_the_entity(tmp_path: Path) -> None:
     played = Stage(tmp_path, FOUR).play(maneuvers(event(lane_change(to_lane(-4), over=6.0), trigger=after(1.0))))
     motion = entity(played)
-    np.testing.assert_array_equal(motion.lane, np.floor(motion.y / WIDTH).astype(int))
+    inside = np.abs(motion.y / WIDTH - np.round(motion.y / WIDTH)) > 1e-9  # at an edge it is still in the lane before
+    np.testing.assert_array_equal(motion.lane[inside], np.floor(motion.y[inside] / WIDTH).astype(int))
     assert sorted(set(motion.lane.tolist())) == [-4, -3, -2, -1]
     np.testing.assert_allclose(motion.y, -WIDTH * (np.abs(motion.lane) - 0.5) + motion.offset, atol=1e-9)
 

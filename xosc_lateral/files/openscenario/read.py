@@ -50,6 +50,23 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
     return remarks
 
 
+_NEWER = {
+    "Interpolation": "is not read: straight pieces join the vertices",
+    "layer": "is not read: the lane of that id is meant, whatever its layer",
+}
+"""Since version 1.4: an element, and an attribute of lanes."""
+
+
+def remark_newer(root: XmlElement) -> list[Unsupported]:
+    """One remark for each kind of what version 1.4 has and nobody reads, at its first place."""
+    found: dict[str, etree._Element] = {}
+    for item in root.xml.iter("{*}*"):
+        for name in {local_name(item), *(str(name) for name in item.attrib if name == "layer")} & _NEWER.keys():
+            found.setdefault(name, item)
+    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in found.items())
+    return [Unsupported(place.element, place, f"{name} {_NEWER[name]}") for name, place in places]
+
+
 NEWEST_VERSION = (1, 3)
 
 LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
@@ -104,6 +121,7 @@ def read_scenario(
         remarks.append(
             Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}")
         )
+        remarks.extend(remark_newer(root))
     remarks.extend(remark_spellings(root))
     scope, values = references.read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)

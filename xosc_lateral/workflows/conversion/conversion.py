@@ -51,7 +51,9 @@ class Conversion(ConvertedScenario, Result):
         lines += [f"  {', '.join(names)} {words}" for words, names in alike.items()]
         if self.provenance.options["with_sensor"]:
             lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
-        lines += [f"  note: {note.what}" for note in self.movement.motion.notes]
+        lines += [
+            f"  note: {note.what}" for note in self.movement.motion.notes if note not in self.movement.motion.doubts
+        ]
         lines += [f"  warning: {warning}" for warning in self.warnings]
         if self.report is not None:
             lines.append(f"report: {self.report}")

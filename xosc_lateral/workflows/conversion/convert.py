@@ -182,6 +182,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
     wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
     warnings = (
         *(() if cut_off is None else (str(cut_off),)),
+        *map(str, plan.played.motion.doubts),
         *other_egos(plan.played.scenario, plan.settings, plan.egos),
         *movement.warnings(),
         *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),

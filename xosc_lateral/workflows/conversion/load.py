@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.options import STEP
+from xosc_lateral.workflows.playing.check import doubts_about
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.road.network import RoadNetwork
@@ -81,8 +82,11 @@ def load_scenario(
 
 def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played:
     """Play nominally; raises `PlaybackError`."""
-    motion = play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
-    return Played(loaded.scenario, loaded.network, motion)
+    played = Played(
+        loaded.scenario, loaded.network, play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
+    )
+    motion, found = played.motion, doubts_about(played.motion, played.network, played.trailers)
+    return replace(played, motion=replace(motion, notes=motion.notes + found, doubts=motion.doubts + found))
 
 
 def road_network(path: Path) -> RoadNetwork:

@@ -18,7 +18,6 @@ from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
-from xosc_lateral.world.motion.trajectory import leaps
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control
 
@@ -180,12 +179,6 @@ class Enriched:
         lines += [
             f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             for departure in self.departures
-        ]
-        lines += [
-            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
-            "ends, or its road has a gap; a lane change before it would avoid that"
-            for entity in self.entities
-            for time, length in leaps(entity.motion)
         ]
         lines += [
             f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"

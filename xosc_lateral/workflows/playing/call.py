@@ -28,7 +28,7 @@ def play(
     allow: Paths = (),
     road: PathLike | None = None,
     road_path: Paths = (),
-    strict: Annotated[bool, flag("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")] = False,
+    strict: Annotated[bool, flag("--strict", help="No vehicle catalog, a run cut off, a doubt: an error.")] = False,
 ) -> Playback:  # fmt: skip
     """Play a scenario's maneuvers, without offsets.
 
@@ -113,6 +113,11 @@ class Playback(Result):
     def notes(self) -> tuple[str, ...]:
         """What was not played, or not as written: a line each, with file and line."""
         return tuple(map(str, self._played.motion.notes))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Of the notes, what can hardly be meant: found by a check after every play."""
+        return tuple(map(str, self._played.motion.doubts))
 
     @property
     def warnings(self) -> tuple[str, ...]:

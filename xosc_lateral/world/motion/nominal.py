@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntFlag
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from xosc_lateral.base.arrays import FloatArray, IndexArray
 from xosc_lateral.base.errors import locate
 from xosc_lateral.base.rows import rows_where
 from xosc_lateral.base.track import Track
+from xosc_lateral.world.road.positions import RouteStep
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.scenario.place import Place
@@ -124,6 +125,16 @@ class Note:
         return " ".join(locate(self.what, path=self.path, line=self.line, element=self.element).split())
 
 
+class FollowedRoute(NamedTuple):
+    """A route that an entity got."""
+
+    entity: str
+    time: float  # [s]
+    steps: tuple[RouteStep, ...]
+    stops: tuple[tuple[int, int, float], ...]  # road, lane and s of the waypoints [m]
+    place: Place  # of the action
+
+
 CUT_OFF = "still runs at the time limit"
 """How a warning of a run that was cut off begins."""
 
@@ -143,6 +154,8 @@ class NominalMotion(Traffic):
 
     end_time: float  # [s]
     ended_by: str  # ``"stop trigger"`` or ``"time limit"`` or what else ended the run
-    notes: tuple[Note, ...]  # what could not be played as written
+    notes: tuple[Note, ...]  # what could not be played as written, and `doubts`
+    doubts: tuple[Note, ...] = ()  # of them, what can hardly be meant
+    routes: tuple[FollowedRoute, ...] = ()  # in order of time
     cut_off: Note | None = None
     """Says that the time limit came before the scenario's end, or before all its stories were over."""

@@ -20,19 +20,13 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, columns, rows_where
+from xosc_lateral.base.rows import blocks, columns
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
-
-_LEAP_DISTANCE = 0.3
-"""Further than what is driven in a step, and slid sideways at `_MAXIMUM_LATERAL_SPEED`, by this much: a leap. [m]"""
-
-_MAXIMUM_LATERAL_SPEED = 10.0
-"""No lateral action is faster. [m/s]"""
 
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
@@ -46,24 +40,6 @@ def distance_driven(motion: EntityMotion) -> FloatArray:
         steps = np.concatenate((distance[rows.start - 1 : rows.start], np.where(placed_anew, 0.0, ahead)))
         distance[rows] = np.cumsum(steps)[1:]
     return distance
-
-
-def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
-    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet."""
-
-    def moved(around: slice) -> FloatArray:
-        return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
-
-    def leaps_there(rows: slice) -> BoolArray:
-        around = slice(rows.start - 1, rows.stop)
-        step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
-        active = (activity & Activity.ACTIVE) != 0
-        whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
-        driven = np.maximum(speed[1:], speed[:-1]) * step
-        return np.asarray(whole & (moved(around) > driven + _LEAP_DISTANCE + _MAXIMUM_LATERAL_SPEED * step))
-
-    leaping = rows_where(len(motion.time), leaps_there, 1)
-    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in leaping]
 
 
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Track:

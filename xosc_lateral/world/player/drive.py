@@ -126,31 +126,17 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
     Between sections of a road that is the one nearest to the middle of the old lane, and the offset is kept; between
     roads it is the one nearest to the entity, which goes to its middle (both as the reference player does it).
     """
-    network = state.network
-    road = network.roads[state.road]
-    at_end = state.s >= road.length - EPSILON if way > 0 else state.s <= EPSILON
-    t = state.t
-    if not at_end:
-        beyond = state.s + way * EPSILON
-        under_it = network.lane_at(state.road, beyond, t - state.offset_t, lane_types=state.lane_types)
-        if not under_it.lane or under_it.lane == state.lane:
-            return None
-        state.move_to(state.road, under_it.lane, beyond, state.offset_t)
-        return way
-    link = road.successor if way > 0 else road.predecessor
-    if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
+    network, road = state.network, state.network.roads[state.road]
+    number = road.section_number(state.s)
+    leaves = number == (len(road.sections) - 1 if way > 0 else 0)
+    t = state.t if leaves else state.t - state.offset_t
+    onto = network.beyond_end(state.road, number, state.lane, way, t, state.kept_types())
+    if onto is None:
         return None
-    index = network.index_of(link.element_id)
-    entry = 1 if link.contact != "end" else -1
-    if entry != way:
-        t = -t
+    if onto.direction != way:
         _turn_round(state)
-    s = 0.0 if entry > 0 else network.roads[index].length
-    under_it = network.lane_at(index, s, t, lane_types=state.lane_types)
-    if not under_it.lane:
-        return None
-    state.move_to(index, under_it.lane, s, 0.0)
-    return entry
+    state.move_to(onto.road, onto.lane, onto.s, 0.0 if leaves else state.offset_t)
+    return onto.direction
 
 
 def _leave_narrow_lane(state: EntityState) -> None:
@@ -158,14 +144,15 @@ def _leave_narrow_lane(state: EntityState) -> None:
     network = state.network
     if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
         return
-    t = state.t
-    nearest, lane_id = inf, 0
-    for lane in network.lanes_at(state.road, state.s):
-        away = abs(lane.centre_t - t) - 0.5 * lane.width
-        if lane.width >= EPSILON and lane.type in state.lane_types and lane.id * state.lane > 0 and away < nearest:
-            nearest, lane_id = away, lane.id
-    if lane_id:
-        state.move_to(state.road, lane_id, state.s, 0.0)
+    lane = network.lane_at(
+        state.road,
+        state.s,
+        state.t,
+        lane_types=state.kept_types(),
+        direction=network.travel_direction(state.road, state.lane),
+    ).lane
+    if lane and network.lane_state_at(state.road, lane, state.s).width >= EPSILON:
+        state.move_to(state.road, lane, state.s, 0.0)
 
 
 def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:

@@ -192,7 +192,7 @@ class _Player:
             else:
                 state.put_in_world(state.pose)
                 what = "no initial position: it stands at the world's origin"
-            self.simulation.note(f"'{state.name}' has {what}", state.entity.place)
+            self.simulation.note(f"'{state.name}' has {what}", state.entity.place, is_doubt=state.active)
 
     def _write(self, time: float) -> None:
         self.times.append(time)
@@ -233,6 +233,8 @@ class _Player:
             end_time=float(time[-1]),
             ended_by=ended_by,
             notes=tuple(simulation.notes),
+            doubts=tuple(simulation.doubts),
+            routes=tuple(simulation.routes),
             cut_off=cut_off,
         )
 

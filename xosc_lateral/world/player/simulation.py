@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.world.motion.nominal import Note, PlayedAction
+from xosc_lateral.world.motion.nominal import FollowedRoute, Note, PlayedAction
 from xosc_lateral.world.player.drive import along_reference, beside_line
 from xosc_lateral.world.player.recorder import MAXIMUM_COORDINATE, MAXIMUM_SPEED, Rows
 from xosc_lateral.world.player.state import ACTIVE, EntityState
@@ -139,6 +139,8 @@ class Simulation:
         self.when_built: list[Callable[[Any], None]] = []
         """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
         self.notes: list[Note] = []
+        self.doubts: list[Note] = []
+        self.routes: list[FollowedRoute] = []
         self._noted: set[tuple[str, str, int | None]] = set()
         self.played: list[PlayedAction] = []
         """All actions started so far, in order of start."""
@@ -167,12 +169,13 @@ class Simulation:
             raise place.error(f"entity '{name}' is not in the scenario", PlaybackError)
         return state
 
-    def note(self, what: str, place: Place) -> None:
-        """Say, once for each place, that something was not played, or not as written."""
+    def note(self, what: str, place: Place, *, is_doubt: bool = False) -> None:
+        """Say, once for each place, that something was not played, or not as written; or that it can't be meant so."""
         key = (what, place.path, place.line)
         if key not in self._noted:
             self._noted.add(key)
             self.notes.append(Note(what, place.path, place.line, place.element))
+            self.doubts += self.notes[-1:] if is_doubt else []
 
     def values_of(self, content: object) -> tuple[Values, str]:
         """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import cos, nan, pi, sin
 from typing import NamedTuple, Protocol
@@ -38,9 +38,13 @@ class RouteGuide:
 
     network: RoadNetwork
     steps: tuple[RouteStep, ...]
+    stops: tuple[tuple[int, int, float], ...] = ()  # road, lane, s [m]
 
     def choose(self, road: int, options: Sequence[LaneLink]) -> LaneLink | None:
         """The link that leads along the route, be it by another connecting road; None: the route does not say."""
+        for link in (link for step in self.steps for link in step.links):
+            if link in options:
+                return link
         roads = [step.road for step in self.steps]
         for index in (index for index, other in enumerate(roads) if other == road):
             way = self._towards(roads[index + 1 :], options)
@@ -58,6 +62,25 @@ class RouteGuide:
                 return link
         return None
 
+    @property
+    def length(self) -> float:
+        """[m]"""
+        return sum(abs(step.s_end - step.s_start) for step in self.steps)
+
+    def way_to(self, here: tuple[int, float], there: tuple[int, float]) -> float | None:
+        """Way along the route from a road and s to a later one; None: they don't lie on it so. [m]"""
+        ways = [end - start for start in self._passes(*here) for end in self._passes(*there) if end >= start]
+        return min(ways, default=None)
+
+    def _passes(self, road: int, s: float) -> Iterator[float]:
+        """How far along the route a place lies; for every time that it is passed. [m]"""
+        before = 0.0
+        for step in self.steps:
+            into, length = (s - step.s_start) * step.direction, abs(step.s_end - step.s_start)
+            if road == step.road and 0.0 <= into <= length:
+                yield before + into
+            before += length
+
     def at(self, path_s: float) -> tuple[int, float, int]:
         """Road, s and direction after `path_s` metres of the route; its end beyond it. [m]"""
         left = max(path_s, 0.0)
@@ -73,10 +96,10 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
     """The shortest way over the stops; None: there is none."""
     if len(stops) < 2 or any(stop.road == NO_ROAD for stop in stops):
         return None
-    first, *via, last = [(stop.road, stop.lane, stop.s) for stop in stops]
+    places = [(stop.road, stop.lane, stop.s) for stop in stops]
     ways = [1 if is_forward(stop.relative_heading) else -1 for stop in stops]
-    steps = network.route(first, last, via=via, ways=ways)
-    return None if steps is None else RouteGuide(network, steps)
+    steps = network.route(places[0], places[-1], via=places[1:-1], ways=ways)
+    return None if steps is None else RouteGuide(network, steps, tuple(places))
 
 
 ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
@@ -165,8 +188,13 @@ class EntityState:
 
     @property
     def lane_types(self) -> frozenset[str]:
-        """Types of the lanes that it is placed in."""
+        """Types of the lanes that it is placed in where nobody says which lane is its own."""
         return WALKED if self.entity.category is EntityCategory.PEDESTRIAN else DRIVING
+
+    def kept_types(self, *lanes: int) -> frozenset[str]:
+        """`lane_types`, and the types of its own lane and of others beside it: what it was put in, it stays in."""
+        section = self.network.roads[self.road].section_at(self.s).by_id
+        return self.lane_types.union(section[lane].type for lane in (self.lane, *lanes) if lane and lane in section)
 
     @property
     def place(self) -> Placement:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from xosc_lateral.world.player.actions import (
@@ -27,10 +28,16 @@ from xosc_lateral.world.player.storyboard import (
     StoryboardElement,
 )
 from xosc_lateral.world.scenario import scenario as read
+from xosc_lateral.world.scenario.dependence import entity_references
 from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
+from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.place import Unsupported
-from xosc_lateral.world.scenario.position import reference_of
-from xosc_lateral.world.scenario.private_actions import TeleportAction
+from xosc_lateral.world.scenario.private_actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    TeleportAction,
+)
 
 
 def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> StoryboardElement:
@@ -48,40 +55,52 @@ def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> Sto
 
 
 def init_actions(init: read.Init, simulation: Simulation) -> list[RunningAction]:
-    """Init actions in the order in which they start: an entity that is placed relative to another comes after it."""
-    actions = [
-        prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
+    """Init actions in the order in which they start.
+
+    They are a set: what is placed relative to an entity comes after all that places that one, global or private. Those
+    of one ``Private`` stay in order, and together where they can.
+    """
+    rows: list[list[_InitStep]] = [[(action, None)] for action in (*init.global_actions, *init.user_defined_actions)]
+    rows += [[(action, private) for action in private.actions] for private in init.privates]
+    return [
+        prepare_action(action, None if owner is None else simulation.actor(owner.entity_ref, owner.place), simulation)
+        for action, owner in _in_order([row for row in rows if row], simulation)
     ]
-    for private in _in_order(init.privates):
-        state = simulation.actor(private.entity_ref, private.place)
-        actions += [prepare_action(action, state, simulation) for action in private.actions]
-    return actions
 
 
-def _in_order(privates: tuple[read.Private, ...]) -> Iterator[read.Private]:
-    waiting = list(privates)
-    placed: set[str] = set()
-    names = {private.entity_ref for private in privates}
-    while waiting:
-        for private in waiting:
-            needs = _references(private) & names - {private.entity_ref}
-            if needs <= placed or private is waiting[-1]:
-                break
-        # The last one waiting goes on even so: a ring of references has no good order.
-        chosen = private if needs <= placed else waiting[0]
-        waiting.remove(chosen)
-        if chosen.entity_ref not in {other.entity_ref for other in waiting}:
-            placed.add(chosen.entity_ref)
-        yield chosen
+_InitStep = tuple[read.Action, read.Private | None]
+"""An action, and whose it is; None: global."""
+
+_PLACED_BESIDE = (TeleportAction, AddEntityAction, FollowTrajectoryAction, LaneChangeAction, LaneOffsetAction)
+"""Actions that look at once where the entities are that they refer to."""
 
 
-def _references(private: read.Private) -> set[str]:
-    names = (
-        reference_of(action.content.position)
-        for action in private.actions
-        if isinstance(action.content, TeleportAction)
-    )
-    return {name for name in names if name is not None}
+def _in_order(rows: list[list[_InitStep]], simulation: Simulation) -> Iterator[_InitStep]:
+    """Rows of actions that start one after the other, the first row that can begin or go on first."""
+    unplaced = Counter(_placed(step) for row in rows for step in row)
+    while rows:
+        k = next((k for k, row in enumerate(rows) if not any(unplaced[name] for name in _needs(row[0]))), None)
+        if k is None:
+            what = "the places of the init refer to each other in a ring: the file's order holds"
+            simulation.note(what, rows[0][0][0].place, is_doubt=True)
+        row = rows.pop(k or 0)
+        unplaced[_placed(row[0])] -= 1
+        yield row.pop(0)
+        rows[:0] = [row] if row else []
+
+
+def _placed(step: _InitStep) -> str:
+    """The entity that an action puts somewhere; empty: none."""
+    content, owner = step[0].content, step[1]
+    if owner is not None:
+        return owner.entity_ref if isinstance(content, TeleportAction) else ""
+    return content.entity_ref if isinstance(content, AddEntityAction) else ""
+
+
+def _needs(step: _InitStep) -> set[str]:
+    """Entities that have to be somewhere before an action starts."""
+    content = step[0].content
+    return set(entity_references(content)) - {_placed(step)} if isinstance(content, _PLACED_BESIDE) else set()
 
 
 def _act(act: read.Act, simulation: Simulation) -> StoryboardElement:

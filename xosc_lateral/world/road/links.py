@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from math import hypot, inf, nextafter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from math import cos, hypot, inf, nextafter, sin
+from typing import NamedTuple
 
-from xosc_lateral.world.road.lanes import Lane, LaneSection
+from xosc_lateral.world.road.lanes import DRIVING, Lane, LaneSection
 from xosc_lateral.world.road.positions import Advance, LaneLink
-from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink, find_lane, lane_pose, normal_angle
+from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink, lane_at, normal_angle
 
 End = tuple[int, int]
 """A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""
 
+
+Pairs = tuple[tuple[int, int], ...]
+"""Lanes before a joint and those that they lead to."""
 
 Chooser = Callable[[Sequence[LaneLink]], LaneLink]
 """Picks one of several ways on; gets at least one."""
@@ -24,72 +28,110 @@ class Links:
         self.roads = roads
         self._index = {road.id: i for i, road in enumerate(roads)}
         self.junctions = {junction.id: junction for junction in junctions}
-        self._links: dict[tuple[int, int, int], tuple[LaneLink, ...]] = {}
+        self._links: dict[tuple[int, int, int, int], tuple[LaneLink, ...]] = {}
         self._ends: dict[End, tuple[End, ...]] = {}
 
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
         """Lanes that follow a lane of the last (first) section when leaving the road at its end (+1) or start (-1)."""
-        key = (road, lane, direction)
+        return self.onward(road, len(self.roads[road].sections) - 1 if direction > 0 else 0, lane, direction)
+
+    # ---- where a lane leads ------------------------------------------------------------------------------------------
+    # The one rule. A lane leads to the lanes that its link names, else to those whose links name it. Where no link says
+    # anything, within a road, the lane of the same id goes on, if it touches and no other lane claims it: many files
+    # leave links out between sections. A lane for vehicles leads to no other kind (a shoulder) while there are lanes
+    # for vehicles beyond. Where all this gives nothing, the lane ends, and who is on it goes on in the nearest one
+    # (`beyond_end`).
+
+    def onward(self, road: int, section: int, lane: int, way: int) -> tuple[LaneLink, ...]:
+        """Lanes that a lane of a section (its number) leads to, when left along (+1) or against (-1) s."""
+        key = (road, section, lane, way)
         if key not in self._links:
             self._links[key] = tuple(dict.fromkeys(self._find_links(*key)))
         return self._links[key]
 
-    def _find_links(self, road: int, lane: int, direction: int) -> Iterator[LaneLink]:
-        here = self.roads[road]
-        link = here.successor if direction > 0 else here.predecessor
-        lane_here = here.sections[-1 if direction > 0 else 0].by_id.get(lane)
-        if link is None or lane_here is None or lane == 0:
-            return
-        if link.element_type == "junction":
-            onward = [
-                *self._through_junction(here, lane_here, link, direction),
-                *self._back_through_direct_junction(here, lane_here, link, direction),
-            ]
-            yield from onward or self._against_traffic(here, lane_here, link, direction)
-            return
-        other = self._index.get(link.element_id)
-        if other is None:
-            return
-        contact = link.contact or self._contact_of(road, direction, other)
-        # as the lane says, else as the other side says
-        ids = lane_here.successors if direction > 0 else lane_here.predecessors
-        there = _end_section(self.roads[other], contact).by_id
-        if ids:
-            targets = [target for target in ids if target in there and target != 0]
-        else:
-            targets = _lanes_linked_to(here, lane_here, direction, self.roads[other], contact)
-        for target in targets:
-            yield self._enter(other, target, contact)
+    def entered(self, road: int, section: int, way: int, link: LaneLink) -> int:
+        """Number of the section that a link from a section leads into."""
+        if self._is_inside(road, section + way):
+            return section + way
+        return 0 if link.direction > 0 else len(self.roads[link.road].sections) - 1
 
-    def _through_junction(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
-        junction = self.junctions.get(link.element_id)
+    def _is_inside(self, road: int, section: int) -> bool:
+        return 0 <= section < len(self.roads[road].sections)
+
+    def _find_links(self, road: int, section: int, lane: int, way: int) -> Iterator[LaneLink]:
+        here = self.roads[road]
+        left = here.sections[section]
+        lane_here = left.by_id.get(lane)
+        if lane_here is None:
+            return
+        if self._is_inside(road, section + way):
+            s, beyond = left.end if way > 0 else left.start, here.sections[section + way]
+            unsaid = _same_id(left, lane_here, way, beyond, s)
+            joint = _Joint(here, beyond, s, way)
+            for target in _lanes_beyond(here, lane_here, way, s, joint, _named_by(lane_here, way), unsaid):
+                yield LaneLink(road, target, s, way)
+            return
+        found = False
+        for other, contact, pairs, is_back in self._joints(road, way) if lane else ():
+            if is_back and found:
+                return
+            named = _named_by(lane_here, way) if pairs is None else [to for source, to in pairs if source == lane]
+            if pairs and not named:
+                continue
+            there, (s, entry) = self.roads[other], (0.0, 1) if contact == "start" else (self.roads[other].length, -1)
+            joint = _Joint(there, there.sections[0 if entry > 0 else -1], s, entry)
+            for target in _lanes_beyond(here, lane_here, way, here.length if way > 0 else 0.0, joint, named):
+                found = not is_back
+                yield LaneLink(other, target, s, entry)
+
+    def _joints(self, road: int, way: int) -> Iterator[tuple[int, str, Pairs | None, bool]]:
+        """Roads beyond an end: index, where it is touched, lanes (None: as they say), whether by its own link only.
+
+        A connection without lanes leads to those that name the lane as their own link.
+        """
+        here = self.roads[road]
+        link = here.successor if way > 0 else here.predecessor
+        if link is not None and link.element_type != "junction":
+            other = self._index.get(link.element_id)
+            if other is not None:
+                yield other, link.contact or self._contact_of(road, way, other), None, False
+            return
+        junction = None if link is None else self.junctions.get(link.element_id)
         for connection in junction.connections if junction else ():
             other = self._index.get(connection.connecting_road)
-            if connection.incoming_road != here.id or other is None:
-                continue
-            contact = connection.contact or "start"
-            targets = [to for source, to in connection.lanes if source == lane.id]
-            if not connection.lanes:  # those that name the lane as their own link
-                targets = _lanes_linked_to(here, lane, direction, self.roads[other], contact)
-            for target in targets:
-                if target in _end_section(self.roads[other], contact).by_id:
-                    yield self._enter(other, target, contact)
+            if connection.incoming_road == here.id and other is not None:
+                yield other, connection.contact or "start", connection.lanes, False
+        if link is None:
+            return
+        # Direct junctions have no connecting roads whose own links lead back: their connections hold both ways.
+        for connection, other, contact in self._direct_connections(here, link, way):
+            yield other, contact, tuple((target, source) for source, target in connection.lanes), False
+        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
+        for other, contact in self._roads_back(here, link.element_id, way):
+            yield other, contact, (), True
 
-    def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
-        """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
-        for other, contact in self._roads_back(here, link.element_id, direction):
-            for candidate in _lanes_linked_to(here, lane, direction, self.roads[other], contact):
-                yield self._enter(other, candidate, contact)
+    def beyond_end(
+        self, road: int, section: int, lane: int, way: int, t: float, lane_types: Collection[str]
+    ) -> LaneLink | None:
+        """Where a lane ends: the lane of these types beyond that is nearest to t, of two the one of its id. [m]
 
-    def _back_through_direct_junction(
-        self, here: Road, lane: Lane, link: RoadLink, direction: int
-    ) -> Iterator[LaneLink]:
-        """Direct junctions have no connecting roads whose own links lead back: their connections hold both ways."""
-        for connection, other, contact in self._direct_connections(here, link, direction):
-            section = _end_section(self.roads[other], contact)
-            for source, target in connection.lanes:
-                if target == lane.id and source in section.by_id:
-                    yield self._enter(other, source, contact)
+        None: the road itself ends there, or a junction begins, or nothing beyond is of these types.
+        """
+        here = self.roads[road]
+        other, entry, lane_here = road, way, here.sections[section].by_id[lane]
+        s = here.sections[section].end if way > 0 else _just_before(here.sections[section].start)
+        if not self._is_inside(road, section + way):
+            link = here.successor if way > 0 else here.predecessor
+            if link is None or link.element_type != "road" or link.element_id not in self._index:
+                return None
+            other = self._index[link.element_id]
+            entry = 1 if link.contact != "end" else -1
+            s = 0.0 if entry > 0 else self.roads[other].length
+        direction = lane_here.direction * way * entry
+        beyond = lane_at(
+            self.roads[other], other, s, t if entry == way else -t, lane_types, prefer=lane, direction=direction
+        )
+        return LaneLink(other, beyond.lane, s, entry) if beyond.lane else None
 
     def _direct_connections(self, here: Road, link: RoadLink, direction: int) -> Iterator[tuple[Connection, int, str]]:
         """Connections of a direct junction that end where this road is left; incoming road, and its end there."""
@@ -112,36 +154,15 @@ class Links:
         to_start, to_end = ((u - x) ** 2 + (v - y) ** 2 for u, v, _ in ends)
         return "start" if to_start <= to_end else "end"
 
-    def _enter(self, road: int, lane: int, contact: str) -> LaneLink:
-        return LaneLink(road, lane, *((0.0, 1) if contact == "start" else (self.roads[road].length, -1)))
-
     def next_roads(self, road: int, direction: int) -> tuple[End, ...]:
         """Roads that can be entered when leaving this one at its end (+1) or start (-1), driven there either way."""
         key = (road, direction)
         if key not in self._ends:
-            self._ends[key] = tuple(dict.fromkeys(self._find_roads(road, direction)))
+            joints = self._joints(road, direction)
+            self._ends[key] = tuple(
+                dict.fromkeys((other, 1 if contact == "start" else -1) for other, contact, *_ in joints)
+            )
         return self._ends[key]
-
-    def _find_roads(self, road: int, direction: int) -> Iterator[End]:
-        here = self.roads[road]
-        link = here.successor if direction > 0 else here.predecessor
-        if link is None:
-            return
-        if link.element_type != "junction":
-            other = self._index.get(link.element_id)
-            if other is not None:
-                yield other, 1 if (link.contact or self._contact_of(road, direction, other)) == "start" else -1
-            return
-        junction = self.junctions.get(link.element_id)
-        for connection in junction.connections if junction else ():
-            other = self._index.get(connection.connecting_road)
-            if connection.incoming_road == here.id and other is not None:
-                yield other, 1 if connection.contact != "end" else -1
-        for _, other, contact in self._direct_connections(here, link, direction):
-            yield other, 1 if contact == "start" else -1
-        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
-        for other, contact in self._roads_back(here, link.element_id, direction):
-            yield other, 1 if contact == "start" else -1
 
     def _roads_back(self, here: Road, junction: str, direction: int) -> Iterator[tuple[int, str]]:
         """Roads of a junction that lead to this one's end (+1) or start (-1) by their own links, and by which end."""
@@ -173,36 +194,26 @@ class Links:
         way = self.roads[road].directions.get(lane, 1) if direction is None else direction
         if distance < 0.0:
             way, distance = -way, -distance
-        here = self.roads[road]
-        section = here.section_at(s)
-        links_passed = 0
+        number, passed = self.roads[road].section_number(s), 0
         while True:
+            section = self.roads[road].sections[number]
             room = section.end - s if way > 0 else s - section.start
-            last = section.end >= here.length if way > 0 else section.start <= 0.0
+            last = not self._is_inside(road, number + way)
             # a section does not hold its own end: whoever reaches it exactly is in the next one
             if distance < room or (distance == room and (last or way < 0)):
                 return Advance(road, lane, s + way * distance, way, 0.0)
             distance -= max(room, 0.0)
-            if not last:
-                beyond = here.section_at(section.end if way > 0 else _just_before(section.start))
-                follower = follow_section(here, section, beyond, lane, way)
-                if follower is None:
-                    return Advance(road, lane, _just_before(section.end) if way > 0 else section.start, way, distance)
-                s = section.end if way > 0 else section.start
-                lane, section = follower, beyond
-                continue
             s = section.end if way > 0 else section.start
-            options = self.next_lanes(road, lane, way)
-            links_passed += 1
+            options = self.onward(road, number, lane, way)
+            passed += 1
             # A ring of roads without length would never end.
-            if not options or links_passed > 100_000:
-                return Advance(road, lane, s, way, distance)
+            if not options or passed > 100_000:
+                return Advance(road, lane, s if last or way < 0 else _just_before(s), way, distance)
             link = options[0]
             if len(options) > 1:
                 link = choose(options) if choose else self.straightest(options)
+            number = self.entered(road, number, way, link)
             road, lane, s, way = link
-            here = self.roads[road]
-            section = here.sections[0 if way > 0 else -1]
 
     def straightest(self, options: Sequence[LaneLink]) -> LaneLink:
         """The link whose road turns least from entry to exit; of equals the first."""
@@ -217,41 +228,59 @@ class Links:
         return abs(normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2]))
 
 
-def _lanes_linked_to(here: Road, lane: Lane, direction: int, other: Road, contact: str) -> list[int]:
-    """Lanes at an end of another road that name this lane as their own link, the one that it touches first."""
-    lanes = _end_section(other, contact).lanes
-    linked = [each.id for each in lanes if lane.id in (each.predecessors if contact == "start" else each.successors)]
-    if len(linked) < 2:
-        return linked
-    x, y = lane_pose(here, lane.id, here.length if direction > 0 else 0.0, 0.0)[:2]
-    ends = {each: lane_pose(other, each, 0.0 if contact == "start" else other.length, 0.0) for each in linked}
-    return sorted(linked, key=lambda each: round(hypot(ends[each].x - x, ends[each].y - y), 6))
+class _Joint(NamedTuple):
+    """What is entered at the end of a lane: a section of a road, at s [m], to be driven along (+1) or against s."""
+
+    road: Road
+    section: LaneSection
+    s: float
+    entry: int
 
 
-def _end_section(road: Road, contact: str) -> LaneSection:
-    return road.sections[0 if contact == "start" else -1]
+def _named_by(lane: Lane, way: int) -> tuple[int, ...]:
+    return lane.successors if way > 0 else lane.predecessors
+
+
+def _lanes_beyond(
+    here: Road, lane: Lane, way: int, s: float, joint: _Joint, named: Sequence[int], unsaid: Sequence[int] = ()
+) -> list[int]:
+    """Those named that are there, else those that name this lane, else what holds where no link says anything."""
+    there = joint.section.by_id
+    targets = [there[target] for target in named if target and target in there]
+    if not targets:
+        targets = [each for each in joint.section.lanes if lane.id in _named_by(each, -joint.entry)]
+        if len(targets) > 1:  # the one that it touches first
+            x, y = _centre_of(here, lane, s)
+            ends = {each.id: _centre_of(joint.road, each, joint.s) for each in targets}
+            targets.sort(key=lambda each: round(hypot(ends[each.id][0] - x, ends[each.id][1] - y), 6))
+    targets = targets or [there[target] for target in unsaid]
+    return [each.id for each in targets if _stays_its_kind(lane, way, each, joint.section, joint.entry)]
+
+
+def _stays_its_kind(lane: Lane, way: int, target: Lane, beyond: LaneSection, entry: int) -> bool:
+    """Whether vehicles that follow a lane follow it into another: not off the lanes for them while there are any."""
+    if lane.type not in DRIVING or target.type in DRIVING:
+        return True
+    return not any(each.type in DRIVING and each.direction * entry == lane.direction * way for each in beyond.lanes)
+
+
+def _centre_of(road: Road, lane: Lane, s: float) -> tuple[float, float]:
+    x, y, heading = road.reference_at(s)
+    t = lane.state_at(s).centre_t
+    return x - t * sin(heading), y + t * cos(heading)
 
 
 _JOINT_TOLERANCE = 1e-3
 """Lanes of two sections touch with a gap of no more, such as one that has closed and one that opens beside it. [m]"""
 
 
-def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:
-    """The lane that goes on in the next section of the same road.
-
-    Where a file gives no link, the lane of the same id goes on if it touches; OpenDRIVE asks for links only where lanes
-    are connected, but many files leave them out between sections.
-    """
-    at = section.end if way > 0 else section.start
-    here = section.by_id.get(lane) or find_lane(road, lane, at)
-    for target in here.successors if way > 0 else here.predecessors:
-        if target in beyond.by_id:
-            return target
-    same = beyond.by_id.get(lane)
-    if same is None:
-        return None
-    (centre, _, width), (other, _, other_width) = here.state_at(at), same.state_at(at)
-    return lane if abs(centre - other) <= 0.5 * max(width, other_width) + _JOINT_TOLERANCE else None
+def _same_id(left: LaneSection, lane: Lane, way: int, beyond: LaneSection, s: float) -> tuple[int, ...]:
+    """The lane of the same id in the next section, if it touches and no other lane's link claims it."""
+    same = beyond.by_id.get(lane.id)
+    if same is None or any(lane.id in _named_by(other, way) for other in left.lanes) or _named_by(same, -way):
+        return (lane.id,) if lane.id == 0 else ()
+    (centre, _, width), (other_centre, _, other_width) = lane.state_at(s), same.state_at(s)
+    return (lane.id,) if abs(centre - other_centre) <= 0.5 * max(width, other_width) + _JOINT_TOLERANCE else ()
 
 
 def _just_before(s: float) -> float:

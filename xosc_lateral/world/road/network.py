@@ -113,10 +113,20 @@ class RoadNetwork(SurfaceIndex, Routes):
         return lane in self.roads[road].section_at(s).by_id
 
     def lane_at(
-        self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
+        self,
+        road: int,
+        s: float,
+        t: float,
+        *,
+        lane_types: Collection[str] | None = DRIVING,
+        prefer: int | None = None,
+        direction: int = 0,
     ) -> LaneCoordinates:
-        """The lane of these types that holds `t`, else the nearest; lane 0 if the road has none of them there. [m]"""
-        return lane_at(self.roads[road], road, s, t, lane_types)
+        """The lane of these types that holds `t`, else the nearest; at the edge of two the lane `prefer`. [m]
+
+        With a `direction`, one that is driven along (+1) or against (-1) s; lane 0 if the road has none there.
+        """
+        return lane_at(self.roads[road], road, s, t, lane_types, prefer=prefer, direction=direction)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""

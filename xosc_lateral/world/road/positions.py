@@ -112,6 +112,8 @@ class RouteStep(NamedTuple):
     direction: int
     s_start: float
     s_end: float
+    links: tuple[LaneLink, ...] = ()  # by which its lanes are entered, section by section; none where lanes are changed
+    missed: int = 0  # lane of a stop on it that the way does not lead to without a lane change; 0: none
 
 
 class RoadMark(NamedTuple):

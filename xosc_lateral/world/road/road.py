@@ -210,22 +210,35 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
     return min(max(0.5 + outwards, 0.0), 1.0)
 
 
-def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
-    """The lane of these types that holds t, else the nearest; lanes of no width only as a last resort. [m]"""
-    best: tuple[float, float, float] | None = None
+def lane_at(
+    road: Road,
+    index: int,
+    s: float,
+    t: float,
+    lane_types: Collection[str] | None,
+    *,
+    prefer: int | None = None,
+    direction: int = 0,
+) -> LaneCoordinates:
+    """The lane of these types that holds t, else the nearest; lanes of no width only as a last resort. [m]
+
+    At the edge of two it is the lane `prefer`; with a `direction`, it is one driven along (+1) or against (-1) s.
+    """
+    best: tuple[float, bool, float, float] | None = None
     nearest: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:
-        if lane_types is not None and lane.type not in lane_types:
+        if (lane_types is not None and lane.type not in lane_types) or direction == -lane.direction:
             continue
         centre, _, width = lane.state_at(s)
         away = abs(t - centre)
-        score = (max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0), away, width)
+        outside = max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0)
+        score = (outside if prefer is None else round(outside, 9), lane.id != prefer, away, width)
         if best is None or score < best:
             best, nearest = score, (lane, centre)
     if best is None or nearest is None:
         return LaneCoordinates(index, 0, s, t, t, inf)
     lane, centre = nearest
-    return LaneCoordinates(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
+    return LaneCoordinates(index, lane.id, s, lane.direction * (t - centre), t, max(best[2] - 0.5 * best[3], 0.0))
 
 
 def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:

@@ -7,15 +7,17 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from heapq import heappop, heappush
-from itertools import pairwise
+from itertools import count, pairwise
 from math import inf
+from typing import NamedTuple, TypeVar
 
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.links import End, Links, follow_section
-from xosc_lateral.world.road.positions import RoadPath, RouteStep
-from xosc_lateral.world.road.road import Road
+from xosc_lateral.world.road.links import Links
+from xosc_lateral.world.road.positions import LaneLink, RoadPath, RouteStep
+
+_Node = TypeVar("_Node")
 
 
 class Routes(Links):
@@ -34,37 +36,19 @@ class Routes(Links):
         if road == target:
             best = RoadPath((target_s - s) * direction, 1 if target_s >= s else -1, ())
         for way in (1, -1):
-            room = self.roads[road].length - s if way > 0 else s
-            reach = min(limit, abs(best.ds) if best is not None else inf)
-            steps = self._search(road, way, room, target, target_s, reach)
-            if steps is not None and (best is None or steps[0] < abs(best.ds)):
-                best = RoadPath(steps[0] * way * direction, way, steps[1])
+            found = _shortest(
+                self.next_roads(road, way),
+                self.roads[road].length - s if way > 0 else s,
+                lambda end: self.next_roads(*end),
+                lambda end: self.roads[end[0]].length,
+                lambda end: (
+                    None if end[0] != target else target_s if end[1] > 0 else self.roads[target].length - target_s
+                ),
+                min(limit, abs(best.ds) if best is not None else inf),
+            )
+            if found is not None and (best is None or found[0] < abs(best.ds)):
+                best = RoadPath(found[0] * way * direction, way, found[1])
         return best if best is not None and abs(best.ds) <= limit else None
-
-    def _search(
-        self, road: int, way: int, room: float, target: int, target_s: float, limit: float
-    ) -> tuple[float, tuple[End, ...]] | None:
-        """Dijkstra over road ends: length to `target_s` on `target`, leaving `road` in direction `way`, and the way."""
-        queue: list[tuple[float, End, tuple[End, ...]]] = [(room, end, (end,)) for end in self.next_roads(road, way)]
-        done: set[End] = set()
-        queue.sort()
-        best: tuple[float, tuple[End, ...]] | None = None
-        while queue:
-            length, end, path = heappop(queue)
-            if length > limit or (best is not None and length >= best[0]):
-                break
-            if end in done:
-                continue
-            done.add(end)
-            index, entry = end
-            if index == target:
-                arrival = length + (target_s if entry > 0 else self.roads[index].length - target_s)
-                if best is None or arrival < best[0]:
-                    best = arrival, path
-            for following in self.next_roads(index, entry):
-                if following not in done:
-                    heappush(queue, (length + self.roads[index].length, following, (*path, following)))
-        return best
 
     def route(
         self,
@@ -77,7 +61,8 @@ class Routes(Links):
         """Shortest drivable way over roads and junctions between two (road, lane, s). [m]
 
         Every stop is left in the direction `ways` (+1 along s, -1 against s), or in its lane's travel direction; where
-        the lane itself leads on, no lanes are changed. None: there is none.
+        the lane itself leads on, no lanes are changed. Of several ways over the same roads (those inside junctions
+        aside), it is the one onto the lane of the next stop. None: there is none.
         """
         steps: list[RouteStep] = []
         stops = [start, *via, end]
@@ -88,7 +73,9 @@ class Routes(Links):
             if leg is None:
                 return None
             if steps and steps[-1].road == leg[0].road and steps[-1].direction == leg[0].direction:
-                leg = (leg[0]._replace(s_start=steps.pop().s_start), *leg[1:])
+                before = steps.pop()
+                links, missed = (*before.links, *leg[0].links), before.missed or leg[0].missed
+                leg = (leg[0]._replace(s_start=before.s_start, links=links, missed=missed), *leg[1:])
             steps += leg
         return tuple(steps)
 
@@ -96,66 +83,131 @@ class Routes(Links):
         self, start: tuple[int, int, float], end: tuple[int, int, float], way: int
     ) -> tuple[RouteStep, ...] | None:
         """The shortest way that the lane itself leads along, as who drives there changes no lanes; else any way."""
-        (road, lane, s), (target, _, target_s) = start, end
-        if road == target and (target_s - s) * way >= 0.0:
-            return (RouteStep(road, way, s, target_s),)
+        (road, lane, s), (target, wanted, target_s) = start, end
+        goal = target, self.roads[target].section_number(target_s), target_s
         for own_lane in (lane, None):
-            path = self._shortest_way((road, way), own_lane, target, s)
-            if path is not None:
-                steps = [RouteStep(road, way, s, self.roads[road].length if way > 0 else 0.0)]
-                for index, entry in path:
-                    length = self.roads[index].length
-                    steps.append(RouteStep(index, entry, *((0.0, length) if entry > 0 else (length, 0.0))))
-                steps[-1] = steps[-1]._replace(s_end=target_s)
-                return tuple(steps)
+            begin = _Stretch(road, self.roads[road].section_number(s), own_lane, way)
+            found = self._shortest_way(begin, s, goal)
+            if found is not None and own_lane is not None and found[-1].lane != wanted:
+                found = self._shortest_way(begin, s, goal, wanted, self._outside_junctions(found)) or found
+            if found is not None:
+                return self._steps_of(found, s, target_s, 0 if found[-1].lane == wanted else wanted)
         return None
 
-    def _shortest_way(self, start: End, lane: int | None, target: int, s: float) -> tuple[End, ...] | None:
-        """Roads from a place to another road, on a lane and those it leads into; None: lanes may be changed."""
-        road, way = start
-        room = self.roads[road].length - s if way > 0 else s
-        queue: list[tuple[float, int, End, int | None, tuple[End, ...]]] = []
-        count = 0
-        for following, onto in self._drivable(start, lane, s):
-            heappush(queue, (room, count, following, onto, (following,)))
-            count += 1
-        done: set[tuple[End, int | None]] = set()
-        while queue:
-            length, _, here, on, path = heappop(queue)
-            if (here, on) in done:
-                continue
-            done.add((here, on))
-            if here[0] == target:
-                return path
-            for following, onto in self._drivable(here, on):
-                if (following, onto) not in done:
-                    count += 1
-                    heappush(queue, (length + self.roads[here[0]].length, count, following, onto, (*path, following)))
-        return None
+    def _outside_junctions(self, way: _Way) -> list[int]:
+        return [each.road for each in way if each.is_entry and self.roads[each.road].junction is None]
 
-    def _drivable(self, here: End, lane: int | None, s: float | None = None) -> Iterator[tuple[End, int | None]]:
-        """Road ends, and lanes there, that a lane leads to; without one those that any driving lane of its way does."""
-        road, way = here
-        section = self.roads[road].sections[-1 if way > 0 else 0]
-        reached: dict[tuple[End, int | None], None] = {}
-        if lane is None:
-            leaving = [way_out.id for way_out in section.lanes if way_out.type in DRIVING and way_out.direction == way]
-        else:
-            leaving = [found for found in (_at_end(self.roads[road], way, lane, s),) if found is not None]
-        for way_out in leaving:
-            for link in self.next_lanes(road, way_out, way):
-                reached[(link.road, link.direction), None if lane is None else link.lane] = None
-        yield from reached
+    def _shortest_way(
+        self,
+        begin: _Stretch,
+        s: float,
+        goal: tuple[int, int, float],
+        wanted: int | None = None,
+        only: Sequence[int] | None = None,
+    ) -> _Way | None:
+        """Lane sections from a place to one of another place, on a lane and those it leads into; without one, on any.
+
+        Onto the lane `wanted`, and over the roads `only` in their order, those inside junctions aside.
+        """
+        target, number, target_s = goal
+
+        def edge(on: _Stretch, way: int) -> float:
+            section = self.roads[on.road].sections[on.section]
+            return section.end if way > 0 else section.start
+
+        def onward(on: _Stretch) -> Iterator[_Stretch]:
+            for onto in self._drivable(on):
+                outside = onto.is_entry and self.roads[onto.road].junction is None
+                if not outside or only is None or only[on.passed : on.passed + 1] == [onto.road]:
+                    yield onto._replace(passed=on.passed + outside)
+
+        def arrival(on: _Stretch) -> float | None:
+            there = on[:2] == (target, number) and wanted in (None, on.lane)
+            return abs(target_s - edge(on, -on.way)) if there else None
+
+        if arrival(begin) is not None and (target_s - s) * begin.way >= 0.0:
+            return (begin,)
+        room = abs(edge(begin, begin.way) - s)
+        found = _shortest(onward(begin), room, onward, lambda on: abs(edge(on, 1) - edge(on, -1)), arrival)
+        return None if found is None else (begin, *found[1])
+
+    def _drivable(self, on: _Stretch) -> Iterator[_Stretch]:
+        """What a lane leads to, ended ones included; without a lane, what any driving lane of its way does."""
+        road, number, lane, way = on[:4]
+        section = self.roads[road].sections[number]
+        leaves = not self._is_inside(road, number + way)
+        if lane is None and not leaves:
+            yield _Stretch(road, number + way, None, way)
+            return
+        lanes = [each.id for each in section.lanes if each.type in DRIVING and each.direction == way]
+        for each in lanes if lane is None else (lane,):
+            links = self.onward(road, number, each, way)
+            if not links and lane in section.by_id:
+                t = section.by_id[each].state_at(section.end if way > 0 else section.start).centre_t
+                beyond = self.beyond_end(road, number, each, way, t, DRIVING)
+                links = () if beyond is None else (beyond,)
+            for link in links:
+                onto = self.entered(road, number, way, link)
+                tracked = (None, None) if lane is None else (link.lane, link)
+                yield _Stretch(link.road, onto, tracked[0], link.direction, tracked[1], leaves)
+
+    def _steps_of(self, way: _Way, s: float, target_s: float, missed: int) -> tuple[RouteStep, ...]:
+        """Road by road."""
+        steps: list[RouteStep] = []
+        for on in way:
+            length = self.roads[on.road].length
+            links = () if on.link is None else (on.link,)
+            if on.is_entry or not steps:
+                steps.append(RouteStep(on.road, on.way, *((0.0, length) if on.way > 0 else (length, 0.0)), links))
+            else:
+                steps[-1] = steps[-1]._replace(links=(*steps[-1].links, *links))
+        steps[0] = steps[0]._replace(s_start=s)
+        steps[-1] = steps[-1]._replace(s_end=target_s, missed=missed)
+        return tuple(steps)
 
 
-def _at_end(road: Road, way: int, lane: int, s: float | None) -> int | None:
-    """What a lane has become where the road is left; None if it ends before."""
-    sections = list(road.sections)[::way]
-    if s is not None:
-        sections = sections[sections.index(road.section_at(s)) :]
-    for section, beyond in pairwise(sections):
-        onward = follow_section(road, section, beyond, lane, way)
-        if onward is None:
-            return None
-        lane = onward
-    return lane
+class _Stretch(NamedTuple):
+    """A lane through a section (its number), or any; which way along s, how it is entered, and if with its road."""
+
+    road: int
+    section: int
+    lane: int | None
+    way: int
+    link: LaneLink | None = None
+    is_entry: bool = False
+    passed: int = 0  # roads entered so far outside of junctions
+
+
+_Way = tuple[_Stretch, ...]
+
+
+def _shortest(
+    first: Iterable[_Node],
+    room: float,
+    onward: Callable[[_Node], Iterable[_Node]],
+    length: Callable[[_Node], float],
+    arrival: Callable[[_Node], float | None],
+    limit: float = inf,
+) -> tuple[float, tuple[_Node, ...]] | None:
+    """Shortest way from one of the nodes `first`, which are `room` away, and its length [m]; None: none within `limit`.
+
+    `arrival`: how far into a node the goal is; None: it is not there.
+    """
+    queue: list[tuple[float, int, _Node, tuple[_Node, ...]]]
+    queue = [(room, number, node, (node,)) for number, node in enumerate(first)]
+    numbers, done = count(len(queue)), set[_Node]()
+    best: tuple[float, tuple[_Node, ...]] | None = None
+    while queue:
+        so_far, _, node, path = heappop(queue)
+        if so_far > limit or (best is not None and so_far >= best[0]):
+            break
+        if node in done:
+            continue
+        done.add(node)
+        rest = arrival(node)
+        if rest is not None and (best is None or so_far + rest < best[0]):
+            best = so_far + rest, path
+        for onto in onward(node):
+            if onto not in done:
+                heappush(queue, (so_far + length(node), next(numbers), onto, (*path, onto)))
+    return best

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.motion.nominal import Activity, FollowedRoute
 from xosc_lateral.world.player.actions.base import AtOnce, Domain, Maker, RunningPrivateAction, at_once
 from xosc_lateral.world.player.drive import align_trailers, connect, disconnect
 from xosc_lateral.world.player.positions.resolve import resolve, route_guide
-from xosc_lateral.world.player.state import guide
+from xosc_lateral.world.player.state import RouteGuide, guide
 from xosc_lateral.world.scenario import global_actions, private_actions
 from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.enums import RouteStrategy
@@ -112,18 +112,30 @@ def assign_route(content: private_actions.AssignRouteAction, action: AtOnce) -> 
     others = {waypoint.strategy for waypoint in content.route.waypoints} - {RouteStrategy.SHORTEST}
     if others:
         action.note(f"routeStrategy {', '.join(sorted(others))}: the shortest way is taken")
-    action.actor.route = route_guide(content.route, action.simulation)
-    if action.actor.route is None:
-        action.note(f"no way leads along route '{content.route.name}': it is not followed")
+    _follow(action, route_guide(content.route, action.simulation), f"route '{content.route.name}'")
 
 
 def acquire_position(content: private_actions.AcquirePositionAction, action: AtOnce) -> None:
     """The shortest way from here to there becomes the route; nothing stops the entity there."""
     state = action.actor
     state.locate()
-    state.route = guide(state.network, [state.place, resolve(content.position, action.simulation)])
-    if state.route is None:
-        action.note("no way leads to the position: it is not acquired")
+    there = resolve(content.position, action.simulation)
+    _follow(action, guide(state.network, [state.place, there]), "a way to the position")
+
+
+def _follow(action: AtOnce, route: RouteGuide | None, what: str) -> None:
+    """Take a route, and say where it needs lane changes: it decides at junctions, and makes none."""
+    action.actor.route = route
+    if route is None:
+        action.note(f"no way leads along {what}: it is not followed")
+        return
+    simulation = action.simulation
+    place = action.content.place
+    simulation.routes.append(FollowedRoute(action.actor.name, simulation.time, route.steps, route.stops, place))
+    for step in route.steps:
+        if step.missed:
+            where = f"lane {step.missed} of road '{route.network.road_ids[step.road]}'"
+            action.note(f"{what} comes to {where} by lane changes only, which others have to make")
 
 
 def controller(content: object, action: AtOnce) -> None:

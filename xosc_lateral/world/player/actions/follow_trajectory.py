@@ -7,7 +7,7 @@ from math import copysign, cos, hypot, pi, sin
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.paths.base import PathPoint, PathProgress
-from xosc_lateral.world.player.paths.registry import duration, path_of
+from xosc_lateral.world.player.paths.registry import VERTEX_RADIUS, duration, path_of
 from xosc_lateral.world.player.positions.resolve import pose_of
 from xosc_lateral.world.player.state import free
 from xosc_lateral.world.player.transition import EPSILON
@@ -37,8 +37,14 @@ class RunningFollowTrajectory(RunningPrivateAction):
         timed, trajectory = self._is_timed, content.trajectory
         path = path_of(trajectory, self.simulation, pose_of, follower=state, follow=follow, is_timed=timed)
         self._path = path
+        timing = content.timing
+        if timing is not None and timing.offset and timing.domain is ReferenceContext.RELATIVE:
+            what = "is counted as in esmini: by the standard, the times of the trajectory come later by it"
+            self.note(f"the offset of relative timing, {timing.offset:g} s, {what}")
         if content.timing is not None and not self._is_timed:
             self.note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
+        start, end = path.at(0.0), path.at(path.length)
+        self._goes_round = trajectory.closed and hypot(end.x - start.x, end.y - start.y) <= VERTEX_RADIUS
         self._s = min(max(content.initial_distance_offset, 0.0), path.length)
         point = path.at(self._s)
         self._time = path.time_at(self._s) if self._is_timed else 0.0
@@ -91,7 +97,7 @@ class RunningFollowTrajectory(RunningPrivateAction):
         if timing is None or not self._is_timed:
             way = copysign(1.0, state.speed) * self._points
             s = self._s + way * abs(state.speed) * step
-            if self.content.trajectory.closed and path.length > 0.0:
+            if self._goes_round and path.length > 0.0:
                 s %= path.length
             self._s = min(max(s, 0.0), path.length)
             return way
@@ -118,7 +124,7 @@ class RunningFollowTrajectory(RunningPrivateAction):
     def _is_at_end(self, way: float, step: float) -> bool:
         if self._is_timed:
             return self._clock > self._path.end_time - EPSILON
-        if self.content.trajectory.closed or step <= 0.0 or self.actor.speed == 0.0:
+        if self._goes_round or step <= 0.0 or self.actor.speed == 0.0:
             return False
         return self._s > self._path.length - EPSILON if way > 0.0 else self._s < EPSILON
 

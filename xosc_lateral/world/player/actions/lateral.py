@@ -39,6 +39,13 @@ class RunningLaneChange(RunningToTarget):
             self._refuse(f"{what}: lane change not played")
             return
         state.turn(0.0 if state.is_forward else pi)
+        self._types = state.kept_types(lane)
+        kind = network.roads[state.road].section_at(state.s).by_id[lane].type
+        if kind not in state.lane_types:
+            stays = (
+                "it stays there until it changes lanes again (in esmini it belongs to the nearest lane for vehicles)"
+            )
+            self.note(f"'{state.name}' changes to lane {lane} of type {kind}: {stays}")
         self._guide = EntityState(state.entity, network, route=state.route)
         """Follows the target lane beside the entity, at its own place across the road."""
         across = state.t - network.lane_state_at(state.road, lane, state.s).centre_t
@@ -115,7 +122,7 @@ class RunningLaneChange(RunningToTarget):
         """Put the actor where its guide is, on the lane that is under it."""
         network, state = self.simulation.network, self.actor
         t = guide.t
-        under_it = network.lane_at(guide.road, guide.s, t, lane_types=state.lane_types)
+        under_it = network.lane_at(guide.road, guide.s, t, lane_types=self._types, prefer=state.lane)
         lane = under_it.lane or guide.lane
         under = network.lane_state_at(guide.road, lane, guide.s)
         state.move_to(guide.road, lane, guide.s, t - under.centre_t)
@@ -173,6 +180,7 @@ class RunningLaneOffset(RunningToTarget):
             # The road under the entity now runs the other way, and so does its +t.
             transition.start, transition.target = -transition.start, -transition.target
             self._forward = state.is_forward
+        state.speed_taken |= abs(state.speed) < EPSILON  # who stands does not drive for being moved sideways
         offset = transition.value()
         done = transition.is_done or abs(offset - transition.target) < EPSILON
         along = 0.0 if state.is_forward else pi

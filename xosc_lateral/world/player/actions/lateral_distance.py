@@ -94,7 +94,7 @@ class BesideOnRoad:
         state, network = self._state, self._state.network
         heading = state.road_heading()
         x, y = state.pose.x - sin(heading) * rest, state.pose.y + cos(heading) * rest
-        there = network.world_to_lane_at(x, y, near=(state.road, state.s))
+        there = network.world_to_lane_at(x, y, near=(state.road, state.s), lane_types=state.kept_types())
         state.move_to(
             there.road, there.lane, there.s, network.offset_from_offset_t(there.road, there.lane, there.offset)
         )

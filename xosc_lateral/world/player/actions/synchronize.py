@@ -99,6 +99,12 @@ class RunningSynchronize(RunningPrivateAction):
             way = self._target_s(entity.path, spot, position) - entity.path.s
             tangent = entity.path.path.at(entity.path.s).tangent
             return way if is_forward(entity.plane.heading - tangent) else -way
+        entity.locate()
+        along = None
+        if entity.route is not None:
+            along = entity.route.way_to((entity.road, entity.s), (spot.road, spot.s))
+        if along is not None:
+            return along
         gap = road_gap(entity, spot)
         if gap is not None:
             return gap.ds

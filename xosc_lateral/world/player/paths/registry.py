@@ -180,7 +180,7 @@ def path_of(
     path = SHAPES[type(shape)](shape, layout)
     start, end = path.at(0.0), path.at(path.length)
     if closes and (gap := hypot(end.x - start.x, end.y - start.y)) > VERTEX_RADIUS:
-        layout.note(f"trajectory '{trajectory.name}' is closed, but ends {gap:.2f} m from its start: there it jumps")
+        layout.note(f"trajectory '{trajectory.name}' is closed, but ends {gap:.2f} m from its start: it ends there")
     return path
 
 

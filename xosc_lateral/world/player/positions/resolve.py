@@ -191,6 +191,10 @@ def route_position(position: positions.RoutePosition, simulation: Simulation) ->
     if route is None:
         raise position.place.error(f"no way leads along route '{position.route.name}'", PlaybackError)
     road, s, direction = route.at(where.path_s)
+    if not -_LENGTH_TOLERANCE <= where.path_s <= route.length + _LENGTH_TOLERANCE:
+        there = f"taken as its {'start' if where.path_s < 0.0 else 'end'}, road '{network.road_ids[road]}', s = {s:g} m"
+        what = f"pathS = {where.path_s:g} m is not on the route, which is {route.length:.1f} m long: {there}"
+        simulation.note(what, position.place, is_doubt=True)
     if direction < 0:
         simulation.note(
             "the route runs against s here: lanes, offset and heading count along it "
@@ -277,7 +281,9 @@ def _on(position: OnRoad, simulation: Simulation, road: int, s: float) -> float:
     """s on the road. [m]"""
     length = simulation.network.roads[road].length
     if not -_LENGTH_TOLERANCE <= s <= length + _LENGTH_TOLERANCE:
-        simulation.note(f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", position.place)
+        simulation.note(
+            f"s = {s:g} m is beyond the road's {length:g} m: taken as its end", position.place, is_doubt=True
+        )
     return min(max(s, 0.0), length)
 
 

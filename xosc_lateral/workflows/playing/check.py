@@ -1,0 +1,176 @@
+"""What can hardly be meant, looked for after a run: lanes, routes, places and jumps that no file would ask for.
+
+It asks nothing of the player: it looks at the motion alone, so that what goes wrong there shows here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import inf
+
+import numpy as np
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array
+from xosc_lateral.base.rows import blocks, rows_where
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion, Note
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.place import Place
+
+LEAP_DISTANCE = 0.3
+"""Further than who drives and slides aside at `MAXIMUM_LATERAL_SPEED`, and aside by this much more: a leap. [m]"""
+
+MAXIMUM_LATERAL_SPEED = 10.0
+"""No lateral action is faster. [m/s]"""
+
+HEIGHT_APART = 2.5
+"""Entities further apart than this in z are on different levels of the road. [m]"""
+
+_PRESENT = np.uint8(Activity.ACTIVE)
+_GUIDED = np.uint8(Activity.LATERAL | Activity.TRAJECTORY | Activity.TELEPORTED)
+
+
+def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str, str]) -> tuple[Note, ...]:
+    """Notes with file, line, entity and time; `trailers`: who is pulled from the start, and by whom."""
+    found: list[Note] = []
+    for entity in motion.entities:
+        if entity.name not in trailers:
+            found += _jumps(entity)
+        if entity.entity.is_vehicle:
+            found += _lanes_for_nobody(entity, network)
+    for route in motion.routes:
+        found += _off_route(route, next(each for each in motion.entities if each.name == route.entity), motion, network)
+    found += _overlaps(motion, trailers)
+    return tuple(found)
+
+
+def _note(what: str, place: Place) -> Note:
+    return Note(what, place.path, place.line, place.element)
+
+
+def _jumps(entity: EntityMotion) -> Iterator[Note]:
+    """The first jump that nobody asked for, and how many there are."""
+    found = leaps(entity)
+    if found:
+        (time, length), more = found[0], f" ({len(found)} times in all)" if len(found) > 1 else ""
+        why = "further than its speed explains: the lane that it follows ends, or its road has a gap"
+        yield _note(f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", entity.entity.place)
+
+
+def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
+    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet."""
+
+    def moved(around: slice) -> FloatArray:
+        return np.hypot(np.diff(motion.x[around]), np.diff(motion.y[around]))
+
+    def leaps_there(rows: slice) -> BoolArray:
+        around = slice(rows.start - 1, rows.stop)
+        step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
+        active = (activity & Activity.ACTIVE) != 0
+        whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
+        driven = np.maximum(speed[1:], speed[:-1]) * step
+        aside = LEAP_DISTANCE + MAXIMUM_LATERAL_SPEED * step
+        return np.asarray(whole & (moved(around) > np.hypot(driven, aside)))
+
+    leaping = rows_where(len(motion.time), leaps_there, 1)
+    return [(float(motion.time[k]), float(moved(slice(k - 1, k + 1))[0])) for k in leaping]
+
+
+def _lanes_for_nobody(entity: EntityMotion, network: RoadNetwork) -> Iterator[Note]:
+    """A vehicle comes from a lane for vehicles onto another kind, and nobody has steered it there."""
+    for rows in blocks(len(entity.time), 1):
+        both = slice(rows.start - 1, rows.stop)
+        road, lane = entity.road[both], entity.lane[both]
+        changes = np.flatnonzero((np.diff(lane) != 0) | (np.diff(road) != 0)) + 1
+        for k in changes.tolist():
+            before, here = (_type_at(entity, network, rows.start - 1 + row) for row in (k - 1, k))
+            guided = (entity.activity[rows.start - 1 + k] & _GUIDED) != 0
+            if before in DRIVING and here and here not in DRIVING and not guided:
+                where = f"lane {lane[k]} of road '{network.road_ids[road[k]]}', of type {here}"
+                what = f"'{entity.name}' comes onto {where}, at {entity.time[rows.start - 1 + k]:.2f} s by itself"
+                yield _note(what, entity.entity.place)
+                return
+
+
+def _type_at(entity: EntityMotion, network: RoadNetwork, row: int) -> str:
+    """Of its lane; empty on none."""
+    road, lane = int(entity.road[row]), int(entity.lane[row])
+    if road < 0 or lane == 0:
+        return ""
+    found = network.roads[road].section_at(float(entity.s[row])).by_id.get(lane)
+    return "" if found is None else found.type
+
+
+def _off_route(
+    route: FollowedRoute, entity: EntityMotion, motion: NominalMotion, network: RoadNetwork
+) -> Iterator[Note]:
+    """Whether an entity leaves its route before its end, or passes beside a waypoint; until it has another route."""
+    later = (other.time for other in motion.routes if other.entity == route.entity and other.time > route.time)
+    begin, end = np.searchsorted(entity.time, (route.time, min(later, default=inf)))
+    roads = [step.road for step in route.steps]
+    at, k = -1, int(begin)
+    for first in _changes(entity.road[begin:end]).tolist():
+        k = int(begin) + first
+        road = int(entity.road[k])
+        if road < 0 or not entity.activity[k] & _PRESENT or road in roads[at : at + 1]:
+            continue
+        if entity.activity[k] & np.uint8(Activity.TELEPORTED):
+            at = roads.index(road) if road in roads else len(roads)  # put there by the file
+        elif road in roads[at + 1 :]:
+            at += 1 + roads[at + 1 :].index(road)
+        elif network.roads[road].junction is None and 0 <= at < len(roads) - 1:
+            where = f"on road '{network.road_ids[road]}', at {entity.time[k]:.2f} s"
+            yield _note(f"'{entity.name}' leaves its route: it is {where}", route.place)
+            return
+    for number, (road, lane, s) in enumerate(route.stops, start=1):
+        on = np.flatnonzero(entity.road[begin:end] == road) + int(begin)
+        side = np.sign(entity.s[on] - s)
+        over = np.flatnonzero((np.diff(side) != 0) & (np.diff(on) == 1))
+        if len(over) and lane != 0 and not (entity.lane[on[over + 1]] == lane).any():
+            row = int(on[over[0] + 1])
+            beside = f"in lane {entity.lane[row]} of road '{network.road_ids[road]}' instead of {lane}"
+            what = f"'{entity.name}' passes waypoint {number} of its route {beside}, at {entity.time[row]:.2f} s"
+            yield _note(what, route.place)
+
+
+def _changes(values: Int32Array) -> IndexArray:
+    """Rows in which an integer column is not as in the row before, the first among them."""
+    return np.flatnonzero(np.diff(values, prepend=values[:1] - 1))
+
+
+def _overlaps(motion: NominalMotion, trailers: dict[str, str]) -> Iterator[Note]:
+    """Whose boxes touch when one of them appears."""
+    starts = [int(np.argmax((each.activity & _PRESENT) != 0)) for each in motion.entities]
+    for i, (entity, row) in enumerate(zip(motion.entities, starts, strict=True)):
+        for j, other in enumerate(motion.entities):
+            pulls = entity.name in trailers or other.name in trailers
+            appears_later = starts[j] > row or (starts[j] == row and j >= i)
+            if pulls or appears_later or not (entity.activity[row] & other.activity[row] & _PRESENT):
+                continue
+            if _touch(entity, other, row):
+                what = f"'{entity.name}' appears in '{other.name}': their boxes overlap at {entity.time[row]:.2f} s"
+                yield _note(what, entity.entity.place)
+
+
+def _touch(entity: EntityMotion, other: EntityMotion, row: int) -> bool:
+    """Whether boxes overlap in the plane (no axis of either parts them), on the same level."""
+    reach = sum(np.hypot(each.box.length, each.box.width) + abs(each.box.center_x) for each in (entity, other))
+    dx, dy = other.x[row] - entity.x[row], other.y[row] - entity.y[row]
+    if np.hypot(dx, dy) > reach or abs(other.z[row] - entity.z[row]) > HEIGHT_APART:
+        return False
+    shapes = [_corners(each, row) for each in (entity, other)]
+    for heading in (entity.heading[row], other.heading[row]):
+        for axis in ((np.cos(heading), np.sin(heading)), (-np.sin(heading), np.cos(heading))):
+            (low, high), (other_low, other_high) = ((s.min(), s.max()) for s in (shape @ axis for shape in shapes))
+            if high <= other_low or other_high <= low:
+                return False
+    return True
+
+
+def _corners(entity: EntityMotion, row: int) -> FloatArray:
+    """Shape (4, 2). [m]"""
+    box, heading = entity.box, entity.heading[row]
+    ahead = box.center_x + 0.5 * box.length * np.array([1, -1, -1, 1])
+    left = box.center_y + 0.5 * box.width * np.array([1, 1, -1, -1])
+    c, s = np.cos(heading), np.sin(heading)
+    return np.stack([entity.x[row] + ahead * c - left * s, entity.y[row] + ahead * s + left * c], axis=1)
