@@ -14,7 +14,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Tables, Written, command
+from xosc_lateral.cli.words import Options, Tables, Written, command, say
 
 # What is said of one option stays together.
 # fmt: off
@@ -49,7 +49,7 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
 
             yield show
     except (KeyboardInterrupt, Interrupted):
-        typer.echo(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
+        say(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
         raise
 
 

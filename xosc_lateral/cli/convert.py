@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say_json, warn, write_stdout
+from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
@@ -151,7 +151,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
         if signal.finished < 0:
             raise
         what = f"{signal.finished} outputs in {output} are finished, and the same command continues"
-        typer.echo(f"xosc-lateral: interrupted; {what}", err=True)
+        say(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (reply.quiet or reply.as_json):

@@ -12,7 +12,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Force, Options, Osi, Quiet, Verbose, Written, command, warn
+from xosc_lateral.cli.words import Force, Options, Osi, Quiet, Verbose, Written, command, say, warn
 from xosc_lateral.workflows.options import Paths
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def fmu(
     platforms = xl.export_fmu(driver, output, fmi=fmi, python=python, compilers=compiler or ())
     content = "calling Python" if python else f"C source, binaries for {', '.join(platforms) or 'no platform'}"
     if not quiet:
-        typer.echo(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
+        say(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
 
 
 @command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
@@ -144,4 +144,4 @@ def c_source(
     """Write a driver as C99 without dependencies: header, source, numbers, a CMake file and an example loop."""
     written = xl.export_c(xl.read_profile(profile, library), output, force=force)
     if not quiet:
-        typer.echo(f"wrote {', '.join(str(path) for path in written)}", err=True)
+        say(f"wrote {', '.join(str(path) for path in written)}", err=True)

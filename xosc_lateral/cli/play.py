@@ -20,6 +20,7 @@ from xosc_lateral.cli.words import (
     Written,
     command,
     pairs,
+    say,
     say_json,
     warn,
     write_stdout,
@@ -62,7 +63,7 @@ def play(
         say_json({"output": None if table is None else str(table), **traces, **played.to_dict()})
     elif not reply.quiet:
         for note in played.notes:
-            typer.echo(note, err=True)
+            say(note, err=True)
     warn(played.warnings)
     if options["strict"] and played.warnings:
         raise typer.Exit(1)
@@ -97,7 +98,7 @@ def view(
     page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
     warn(played.warnings)
     if not quiet:
-        typer.echo(str(page))
+        say(str(page))
     if open_page or (open_page is None and sys.stdout.isatty()):
         typer.launch(page.absolute().as_uri())
 

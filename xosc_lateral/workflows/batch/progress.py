@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
+from xosc_lateral.base.names import in_terminal
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 
 NOBODY = "nobody"
@@ -79,7 +80,7 @@ class Summary:
         if outcome.state is not JobState.FAILED or key in self._shown:
             return ""
         self._shown.add(key)
-        return f"xosc-lateral: {outcome.row.error}"
+        return in_terminal(f"xosc-lateral: {outcome.row.error}")
 
     @property
     def finished(self) -> int:
