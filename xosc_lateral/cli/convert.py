@@ -96,6 +96,7 @@ def _convert_one(
     source: Path, output: str | None, options: dict[str, Any], variants: int, report: str | None, osi: str | None,
     reply: Written,
 ) -> None:
+    from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
     from xosc_lateral.workflows.conversion.conversion import osi_files
@@ -124,9 +125,10 @@ def _convert_one(
         claim([*outputs, *pages, *both], [source], force=reply.force)
         unclean = False
         for variant, (path, its_page, its_trace) in enumerate(files, start=1):
-            result = convert(source, path, variant=variant, report=its_page, **options)
-            if its_trace is not None:
-                result.write_osi(its_trace, force=True)
+            with together():
+                result = convert(source, path, variant=variant, report=its_page, **options)
+                if its_trace is not None:
+                    result.write_osi(its_trace, force=True)
             reply.say(result)
             _warn_if_cut_off(result, reply.quiet or reply.as_json)
             unclean |= bool(result.warnings) or not result.enriched

@@ -39,14 +39,17 @@ class Outputs:
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
+        from xosc_lateral.files.atomic import together
+
         table, trace = reply.claim(
             [source], table=(self.states, "states.csv"), trace=(self.osi, f"{source.stem}_gt.mcap")
         )
         run = live(source, **options)
-        if table is not None:
-            run.write(table, force=reply.force)
-        if trace is not None:
-            run.write_osi(trace, force=reply.force)
+        with together():
+            if table is not None:
+                run.write(table, force=reply.force)
+            if trace is not None:
+                run.write_osi(trace, force=reply.force)
         warn(run.warnings)
         reply.say(run)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.names import in_csv
 from xosc_lateral.base.version import __version__
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import SIDECAR_SUFFIX
 from xosc_lateral.files.source import hash_of
@@ -60,8 +60,9 @@ def write_table(
         return
     data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)
     record = stamped(provenance) | {"sha256": hash_of(data)}
-    write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
-    write_atomically(path, data)
+    with together():
+        write_atomically(path, data)
+        write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
 
 
 def csv_text(frame: pd.DataFrame) -> str:

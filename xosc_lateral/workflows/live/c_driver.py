@@ -13,7 +13,7 @@ from xosc_lateral.base.names import in_c_comment, in_c_identifier
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.live.c_numbers import inputs_of, numbers_of
 
@@ -32,9 +32,9 @@ def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False)
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [output_folder(folder) / name for name in texts]
     claim(written, force=force)
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    for path, text in zip(written, texts.values(), strict=True):
-        write_atomically(path, text.encode())
+    with together():
+        for path, text in zip(written, texts.values(), strict=True):
+            write_atomically(path, text.encode())
     return written
 
 
