@@ -67,6 +67,10 @@ JOB_TIMEOUT = Limit(
 )
 JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
 
+REPEATED_RUNS = Limit(
+    20, "", "runs of an action that offsets follow", "more is one that runs at every step, and never lets go"
+)
+
 PARSER_TIME = Limit(120, "s", "time that a library may read a file for", "a small one takes a second")
 PARSER_TIME_PER_SIZE = Limit(4, "s", "more for each MB of the file", "a trace of OSI takes up to one")
 PARSER_MEMORY = Limit(4000, "MB", "memory to read a file with, and three times its size", "as for one scenario")
