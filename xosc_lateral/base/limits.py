@@ -46,6 +46,8 @@ UNPACKED_SIZE = Limit(4000, "MB", "unpacked size of a gz, zip or Parquet file", 
 TABLE_CELLS = Limit(250e6, "", "cells of a table", "2 GB as doubles: 24 h at 50 Hz with 57 columns")
 TABLE_COLUMNS = Limit(2000, "", "columns of a table", "bus logs have hundreds; beyond, it is transposed")
 PROFILE_SIZE = Limit(50, "MB", "size of a driver profile", "fitted ones have less than 1 MB")
+RESPONSE = Limit(600, "s", "lag, preview or response time of an effect", "drivers look seconds ahead and tire in hours")
+COURSE = Limit(100, "", "shifts in time of an effect's course", "fitted ones have three; each costs a row per step")
 JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
 XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
 
