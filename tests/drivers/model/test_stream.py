@@ -304,7 +304,7 @@ def test_an_edited_state_is_refused_or_leads_to_offsets_of_a_lane(rate: float | 
     whole = unsealed(stream.to_dict())
     leaves = [path for path in _leaves(whole) if path and path[0] != "profile"]
     outcomes = Counter[str]()
-    for _ in range(60):
+    for _ in range(30):
         values = json.loads(json.dumps(whole))
         *above, last = chance.choice(leaves)
         owner = values
@@ -323,7 +323,7 @@ def test_an_edited_state_is_refused_or_leads_to_offsets_of_a_lane(rate: float | 
         offsets = [edited.step(ROAD_CONTEXT) for _ in range(60)]
         assert np.abs(offsets).max() < 1.5 * 3.7, (above, last, owner[last])
         outcomes["fine"] += 1
-    assert min(outcomes.values()) > 5
+    assert min(outcomes.values()) > 3
 
 
 def test_a_state_of_a_driver_far_out_or_not_begun_goes_on() -> None:
