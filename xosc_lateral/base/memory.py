@@ -43,11 +43,11 @@ def _of_container() -> float:
     if group is None:
         return float("inf")
     free, folder = float("inf"), Path("/sys/fs/cgroup", group.lstrip("/"))
-    for one in (folder, *folder.parents):
-        limit, used = (_lines(one / name)[:1] for name in ("memory.max", "memory.current"))
+    for place in (folder, *folder.parents):
+        limit, used = (_lines(place / name)[:1] for name in ("memory.max", "memory.current"))
         if limit and used and limit[0].strip() != "max":
             free = min(free, float(limit[0]) - float(used[0]))
-        if one == Path("/sys/fs/cgroup"):
+        if place == Path("/sys/fs/cgroup"):
             break
     return free
 

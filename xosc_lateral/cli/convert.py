@@ -107,7 +107,7 @@ def _convert_one(
 
     def limited(target: Path | None, **more: Any) -> Conversion:
         try:
-            return within_limits(lambda one: convert(source, one, **more, **options), target, JobLimits(**limits))
+            return within_limits(lambda path: convert(source, path, **more, **options), target, JobLimits(**limits))
         except JobLimitError as error:
             raise JobLimitError(f"{source}: {error}") from error
 

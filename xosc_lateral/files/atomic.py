@@ -62,12 +62,12 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     """
     path = Path(path)
     refuse_guarded(path)
-    with ExitStack() as own, _naming(path):
-        staged, kept = _STAGED.get() or ({}, own)
+    with ExitStack() as alone, _naming(path):
+        staged, kept = _STAGED.get() or ({}, alone)
         temporary = kept.enter_context(_temporary_beside(path, path.suffix))
         write(temporary)
         staged[path] = temporary
-        if kept is own:
+        if kept is alone:
             _move(staged)
     return path
 
@@ -167,8 +167,8 @@ def mend(outputs: Iterable[Path]) -> None:
     for output in outputs:
         stems.setdefault(output.parent, set()).update((output.stem[:_STEM], output.name[:_STEM]))
     for folder, wanted in stems.items():
-        found = {path: begun.fullmatch(path.name) for path in folder.glob(".*.tmp*")}
-        mine = [path for path, match in found.items() if match is not None and match[1] in wanted]
+        matches = {path: begun.fullmatch(path.name) for path in folder.glob(".*.tmp*")}
+        mine = [path for path, match in matches.items() if match is not None and match[1] in wanted]
         for path in sorted(mine, key=lambda path: path.suffix != _PLAN):
             with contextlib.suppress(OSError, FormatError), open_own(path, flags=0) as file:
                 if not _lock(file.fileno()):

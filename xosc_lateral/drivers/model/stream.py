@@ -228,9 +228,9 @@ class OffsetStream:
             state.process, state.mean, state.drawn = driver.process, driver.mean, driver.drawn
             state.responses = [response.state for response in self._driver.responses]
         whole = sealed(plain(state))
-        _GIVEN[whole["sha256"]] = None
-        if len(_GIVEN) > REMEMBERED:
-            del _GIVEN[next(iter(_GIVEN))]
+        _SAVED_HASHES[whole["sha256"]] = None
+        if len(_SAVED_HASHES) > REMEMBERED:
+            del _SAVED_HASHES[next(iter(_SAVED_HASHES))]
         return whole
 
     @classmethod
@@ -241,9 +241,9 @@ class OffsetStream:
         where no driver is: one that this process has not given itself is tried for half a minute.
         """
         try:
-            if (given := unsealed(state)) and state["sha256"] not in _GIVEN:
-                cls._restored(profile, given)._try_out()
-            return cls._restored(profile, given)
+            if (values := unsealed(state)) and state["sha256"] not in _SAVED_HASHES:
+                cls._restored(profile, values)._try_out()
+            return cls._restored(profile, values)
         except DriverProfileError:
             raise
         except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as error:  # sealed anew by hand
@@ -285,7 +285,7 @@ class OffsetStream:
 REMEMBERED = 1000
 """States that this process has given last, by their hashes, are as they were. [-]"""
 
-_GIVEN: dict[str, None] = {}
+_SAVED_HASHES: dict[str, None] = {}
 
 
 def sealed(values: Mapping[str, Any], form: str = FORMAT) -> dict[str, Any]:
