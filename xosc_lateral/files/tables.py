@@ -170,8 +170,8 @@ def read_parquet(path: Path, columns: Sequence[str] | None = None, otherwise: st
 
     with open_source(path) as source, foreign_errors(path, "can't be read as Parquet"):
         file = pq.ParquetFile(source.file)
-        about, found = file.metadata, file.schema_arrow.names
-        if missing := [name for name in columns or () if name not in found]:
+        about, known = file.metadata, file.schema_arrow.names
+        if missing := [name for name in columns or () if name not in known]:
             raise FormatError(f"no column {missing[0]!r}: {otherwise}", path=path)
         groups = range(about.num_row_groups)
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))

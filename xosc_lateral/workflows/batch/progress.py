@@ -66,8 +66,8 @@ class Summary:
             reasons = self.anew if outcome.state is JobState.WRITTEN else self.kept
             reasons[outcome.why] = reasons.get(outcome.why, 0) + 1
         self.with_warnings += bool(row.warnings)
-        who = " and ".join(row.ego) or NO_VEHICLE
-        self.under_test[who] = self.under_test.get(who, 0) + 1
+        vehicles = " and ".join(row.ego) or NO_VEHICLE
+        self.under_test[vehicles] = self.under_test.get(vehicles, 0) + 1
         if row.cut_off:
             self.cut_off.append(row.output)
         if not row.enriched:

@@ -162,10 +162,10 @@ class Conversion(ConvertedScenario, Result):
         host = next(iter(self.ego), None)
         words = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant + 1}"
         paths = [entity.trajectory for entity in made.entities]
-        said = f"{self.source.name}, as its maneuvers say"
+        nominal_words = f"{self.source.name}, as its maneuvers say"
         with together():
             write_osi(enriched, made.motion, made.network, paths, host=host, description=words)
-            write_osi(nominal, made.motion, made.network, host=host, description=said)
+            write_osi(nominal, made.motion, made.network, host=host, description=nominal_words)
         return outputs
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
