@@ -22,7 +22,7 @@ $(STAMP): pyproject.toml
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap,osi,sumo,fmu]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap,osi,sumo]'
 	@touch $@
 
 # And what building the documentation needs.
@@ -124,7 +124,7 @@ $(WHEEL): | $(STAMP)
 # Every package that development and CI install, with hashes; see SECURITY.md. All extras but `commonroad`, whose protobuf
 # is not the one of `osi`.
 LOCK := requirements/lock.txt
-EXTRAS := mdf osi cluster classifier board sumo fmu docs dev
+EXTRAS := mdf osi cluster classifier board sumo docs dev
 UV ?= $(BIN)/uv
 MATRIX ?= 3.11 3.12 3.13
 

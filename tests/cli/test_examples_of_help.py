@@ -22,7 +22,7 @@ from xosc_lateral.cli import VERBS, main, verb
 PROGRAM = "xosc-lateral "
 NEEDED = {
     "import mf4": "asammdf", "import commonroad": "commonroad", "import osi": "osi_utilities", "--osi": "osi_utilities",
-    "live sumo": "libsumo", "fmu -p motorway --python": "pythonfmu",
+    "live sumo": "libsumo",
 }  # fmt: skip
 """Words of an example -> the package of the extra that it takes."""
 

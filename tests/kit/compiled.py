@@ -16,7 +16,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.workflows.live.c_driver import export_c, identifier, inputs_of
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
+STRICT = ("-Wall", "-Wextra", "-pedantic", "-Wdouble-promotion", "-Wfloat-equal", "-Werror", "-ffp-contract=off")
 
 SANITIZED = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
@@ -29,9 +29,9 @@ def compiler(name: str = "cc") -> str:
     return path
 
 
-def build(sources: Sequence[Path], target: Path, *flags: str, name: str = "cc") -> Path:
-    """Compile without a warning."""
-    words = [compiler(name), *STRICT, *flags, *map(str, sources), "-o", str(target), "-lm"]
+def build(sources: Sequence[Path], target: Path, *flags: str, name: str = "cc", language: str = "-std=c99") -> Path:
+    """Compile without a warning; the source is C99, and C++17 too."""
+    words = [compiler(name), *language.split(), *STRICT, *flags, *map(str, sources), "-o", str(target), "-lm"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0 and not done.stderr, done.stderr
     return target
@@ -54,11 +54,13 @@ class CompiledDriver:
             "message": [pointer],
             "save": [pointer, pointer],
             "restore": [pointer, pointer, ctypes.c_size_t],
+            "fault": [pointer],
+            "fault_message": [pointer],
         }
         self.functions = {name: getattr(library, f"{identifier(profile)}_{name}") for name in kinds}
         for name, arguments in kinds.items():
             self.functions[name].argtypes = arguments
-        self.functions["message"].restype = ctypes.c_char_p
+        self.functions["message"].restype = self.functions["fault_message"].restype = ctypes.c_char_p
         self.state = ctypes.create_string_buffer(self.memory)
 
     def _call(self, name: str, *arguments: object) -> None:
@@ -82,6 +84,10 @@ class CompiledDriver:
         row, outputs = self._row(values), np.empty(3)
         self._call("step", time, row.ctypes.data, outputs.ctypes.data)
         return outputs
+
+    def fault(self) -> tuple[int, str]:
+        """What wanted what can't be driven, and in words."""
+        return self.functions["fault"](self.state), self.functions["fault_message"](self.state).decode()
 
     def save(self) -> bytes:
         """The state as bytes."""
@@ -110,6 +116,16 @@ def varying(columns: Sequence[str], rows: int, seed: int) -> dict[str, np.ndarra
         else:  # of any unit
             values = np.where(share < 0.2, np.nan, 8.0 * (share - 0.6))
         context[name] = values
+    return context
+
+
+def gentle(columns: Sequence[str], rows: int) -> dict[str, np.ndarray]:
+    """Context in which nothing is sudden: what is a truth value or a lane stays."""
+    time, context = 0.2 * np.arange(rows), {}
+    for k, name in enumerate(columns):
+        wave = np.sin(time / (15.0 + k))
+        middle, swing = {"speed": (28.0, 3.0), "lane_width": (3.6, 0.1)}.get(name, (40.0, 10.0))
+        context[name] = np.ones(rows) if name in ("is_truck", "lane_index") else middle + swing * wave
     return context
 
 

@@ -121,5 +121,9 @@ class StandIn:
         to[one.name] = self.network.offset_from_offset_t(road, lane, offset_t) - float(one.offset[row])
         return 0
 
+    def SE_ReportObjectSpeed(self, number: int, speed: float) -> int:
+        del number, speed  # the one that it has
+        return 0
+
     def SE_RegisterStoryBoardElementStateChangeCallback(self, callback: Callable[..., None]) -> None:
         self.callback = callback

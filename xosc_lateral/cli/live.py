@@ -113,7 +113,7 @@ class Fmi(StrEnum):
 
 @command(
     export, "fmu", "A functional mock-up unit, C source and binaries.",
-    "export fmu -p motorway --fmi 3.0 -o driver.fmu", "export fmu -p motorway --python -o driver.fmu",
+    "export fmu -p motorway --fmi 3.0 -o driver.fmu",
 )
 def fmu(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
@@ -121,19 +121,15 @@ def fmu(
     fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
     compiler: Annotated[list[str] | None, typer.Option(metavar="CC",
         help="C compiler to make a binary with; may be repeated. Default: the host's.")] = None,
-    python: Annotated[
-        bool, typer.Option("--python", help="Call this package instead, where it is simulated (extra fmu).")
-    ] = False, library: Paths = (), force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
+    library: Paths = (), force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Write a driver as a functional mock-up unit for co-simulation: C source, with binaries where a compiler is."""
     from xosc_lateral.files.output_paths import claim
 
-    if python and compiler:
-        raise typer.BadParameter("a --python unit is not compiled", param_hint="--compiler")
     claim([output], force=force)
     driver = xl.read_profile(profile, library)
-    platforms = xl.export_fmu(driver, output, fmi=fmi, python=python, compilers=compiler or ())
-    content = "calling Python" if python else f"C source, binaries for {', '.join(platforms) or 'no platform'}"
+    platforms = xl.export_fmu(driver, output, fmi=fmi, compilers=compiler or ())
+    content = f"C source, binaries for {', '.join(platforms) or 'no platform'}"
     if not quiet:
         say(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
 

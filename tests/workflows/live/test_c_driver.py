@@ -18,6 +18,7 @@ from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,
     Acts,
+    ColumnEffect,
     Effect,
     Factor,
     Form,
@@ -67,6 +68,7 @@ def compared(driver: CompiledDriver, profile: DriverProfile, rows: int, seed: in
     """Largest difference to the batch call, the context known ahead. [m]"""
     context = varying(driver.columns, rows, seed)
     wanted = sample_offsets(profile, segment_of(context, begin), child(np.random.SeedSequence(seed), 2))
+    assert (np.abs(wanted) < 1.5 * context["lane_width"]).all()  # beyond, `sample` goes on, and no vehicle does
     driver.start(seed, drive=2, time=begin)
     for row in range(driver.looks):
         driver.look(row_of(context, row))
@@ -92,6 +94,13 @@ def refused(effect: Effect) -> bool:
     return False
 
 
+def weaker(effect: Effect) -> Effect:
+    """All of them together stay within what can be driven."""
+    if not isinstance(effect, ColumnEffect):
+        return effect
+    return replace(effect, coefficients=tuple(0.2 * value for value in effect.coefficients))
+
+
 def test_at_most_two_kinds_of_effects_are_missing_in_c() -> None:
     assert {type(effect) for effect in EXAMPLES} == set(EFFECTS)
     assert sum(map(refused, EXAMPLES)) <= 2
@@ -100,8 +109,8 @@ def test_at_most_two_kinds_of_effects_are_missing_in_c() -> None:
 @pytest.mark.parametrize("core", ["motorway", "two-level"])
 def test_every_effect_that_a_profile_can_hold_acts_as_in_the_batch_call(core: str, tmp_path: Path) -> None:
     base = two_level() if core == "two-level" else read_profile(core)
-    examples = tuple(effect for effect in EXAMPLES if not refused(effect))
-    for number, effects in enumerate([(*examples, *EVERY_FORM, *MORE), (), examples[::-1][:7]]):
+    examples = tuple(weaker(effect) for effect in EXAMPLES if not refused(effect))
+    for number, effects in enumerate([(*examples, *map(weaker, (*EVERY_FORM, *MORE))), (), examples[::-1][:7]]):
         profile = replace(base, effects=effects)
         driver = CompiledDriver(profile, tmp_path / str(number))
         assert compared(driver, profile, 1500, 1) < TOLERANCE
@@ -139,15 +148,13 @@ def test_without_looking_ahead_the_driver_responds_later_and_at_any_step_follows
 
 
 def test_steps_of_a_second_hold_the_context_that_they_are_given(tmp_path: Path) -> None:
-    profile = read_profile("motorway")
-    driver = CompiledDriver(profile, tmp_path)
+    driver = CompiledDriver(read_profile("motorway"), tmp_path)
     context = varying(driver.columns, 60, 5)
     driver.start(5)
     offsets = [driver.step(float(k), row_of(context, k))[0] for k in range(60)]
-    late = np.maximum(np.arange(59 * 5 + 1) - driver.looks, 0)  # rows of the model by what was known of them
-    held = {name: values[-(-late // 5)] for name, values in context.items()}
-    wanted = sample_offsets(profile, segment_of(held), child(np.random.SeedSequence(5), 0))
-    np.testing.assert_allclose(offsets, wanted[::5], rtol=0.0, atol=TOLERANCE)
+    driver.start(5)
+    held = [driver.step(0.2 * row, row_of(context, -(-row // 5)))[0] for row in range(59 * 5 + 1)]
+    np.testing.assert_allclose(offsets, held[::5], rtol=0.0, atol=TOLERANCE)
 
 
 def test_the_rate_is_the_offsets_and_the_heading_the_rates(tmp_path: Path) -> None:
@@ -240,6 +247,7 @@ def test_it_compiles_without_a_warning_and_the_example_runs_under_sanitizers(nam
         program = build(sorted(folder.glob("*.c")), folder / "example", *SANITIZED, name=name)
         lines = subprocess.run([program], capture_output=True, text=True, check=True).stdout.splitlines()
         assert len(lines) == 601 and lines[-1].startswith("60.00 ")
+        build(sorted(folder.glob("driver_*.c")), folder / "too.o", "-c", name=name, language="-x c++ -std=c++17")
 
 
 def test_the_cmake_file_builds_it(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A driver as an FMU, in C and in Python: valid, and the offsets that `sample` gives."""
+"""A driver as an FMU: valid, and the offsets that `sample` gives."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from tests.kit.compiled import SANITIZED, build, compiler, varying
+from tests.kit.compiled import SANITIZED, build, compiler, gentle
 from xosc_lateral.cli import main
+from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.workflows.live.c_numbers import inputs_of
+from xosc_lateral.workflows.live.traffic import Moment, Traffic
 
 fmpy = pytest.importorskip("fmpy", reason="no fmpy here")
 pytestmark = pytest.mark.filterwarnings("ignore")  # of foreign packages
@@ -24,26 +26,22 @@ pytestmark = pytest.mark.filterwarnings("ignore")  # of foreign packages
 VERSIONS = ("2.0", "3.0")
 
 
+class Alone(Traffic):
+    """The driver that `sample` gives for the seed."""
+
+    def seed_of(self, name: str) -> np.random.SeedSequence:
+        return child(np.random.SeedSequence(self.seed), 0)
+
+
 def exported(version: str, path: Path, *words: str, profile: str = "motorway") -> Path:
     assert main(["export", "fmu", "-p", profile, "--fmi", version, "-o", str(path), "-q", *words]) == 0
     return path
 
 
-@pytest.fixture(scope="module", params=[(version, python) for version in VERSIONS for python in (False, True)],
-                ids=lambda how: f"{how[0]}-{'Python' if how[1] else 'C'}")  # fmt: skip
+@pytest.fixture(scope="module", params=VERSIONS)
 def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    version, python = request.param
-    folder = tmp_path_factory.mktemp("python" if python else "fmu")
-    if python:
-        pytest.importorskip("pythonfmu")
-        pytest.importorskip("pythonfmu3")
-    else:
-        compiler()
-    return exported(version, folder / f"driver{version[0]}.fmu", *(["--python"] if python else []))
-
-
-def calls_python(unit: Path) -> bool:
-    return unit.parent.name.startswith("python")
+    compiler()
+    return exported(request.param, tmp_path_factory.mktemp("fmu") / f"driver{request.param[0]}.fmu")
 
 
 def test_it_is_valid_and_has_units(unit: Path) -> None:
@@ -52,6 +50,7 @@ def test_it_is_valid_and_has_units(unit: Path) -> None:
     assert validate_fmu(str(unit)) == []
     described = fmpy.read_model_description(str(unit))
     units = {one.name: one.unit for one in described.modelVariables if one.causality in ("input", "output")}
+    assert {one.name for one in described.modelVariables if one.type in ("Integer", "Int32")} == {"seed", "fault"}
     assert units["offset"] == "m" and units["rate"] == "m/s" and units["heading"] == "rad"
     assert units["speed"] == "m/s" and units["left_distance"] == "m" and units["is_truck"] == "-"
     assert {one.name for one in described.modelVariables if one.causality == "parameter"} >= {"seed"}
@@ -59,19 +58,14 @@ def test_it_is_valid_and_has_units(unit: Path) -> None:
     assert means.canGetAndSetFMUstate and means.canSerializeFMUstate
 
 
-@pytest.mark.parametrize("profile", ["", "motorway-vehicle-3"])
-def test_simulated_it_is_what_is_sampled(unit: Path, profile: str) -> None:
-    if profile and not calls_python(unit):
-        pytest.skip("a unit in C has one profile")
+def test_simulated_it_is_what_is_sampled(unit: Path) -> None:
     seconds = 12.0
     values = {"seed": 4, "is_truck": 1.0, "lane_index": 1.0, "speed": 27.0, "lane_width": 3.6}
-    values |= {"profile": profile} if profile else {}
-    inside = xl.read_profile(profile or "motorway")
     rows = round(seconds / 0.2) + 1
     columns = {"speed": 27.0, "lane_width": 3.6, "is_truck": 1.0, "lane_index": 1.0}
     away = {"left_distance": np.inf, "right_distance": np.inf}
     table = pd.DataFrame({"drive": "one", "time": 0.2 * np.arange(rows), "offset": 0.0, **columns, **away})
-    wanted = xl.sample(inside, context=table, seed=4).to_frame().offset.to_numpy()
+    wanted = xl.sample("motorway", context=table, seed=4).to_frame().offset.to_numpy()
     found = fmpy.simulate_fmu(
         str(unit), stop_time=seconds, step_size=0.05, output_interval=0.05, start_values=values, output=["offset"]
     )
@@ -121,7 +115,6 @@ def test_what_a_driver_can_not_do_is_refused_with_a_reason_and_the_next_step_goe
 
     described = fmpy.read_model_description(str(unit))
     is_2 = described.fmiVersion.startswith("2")
-    assert ("Needs a host with Python" in described.description) == calls_python(unit)
     one = instantiate_fmu(extract(str(unit), str(tmp_path)), described, "CoSimulation", debug_logging=not is_2)
     number = {variable.name: [variable.valueReference] for variable in described.modelVariables}
     write = one.setReal if is_2 else one.setFloat64
@@ -185,37 +178,45 @@ def run(unit: Path, context: dict[str, np.ndarray], step: float, seed: int = 3, 
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_under_a_context_that_changes_it_is_what_is_sampled_a_preview_later(version: str, tmp_path: Path) -> None:
+def test_under_a_context_that_changes_gently_it_is_what_is_sampled_a_preview_later(
+    version: str, tmp_path: Path
+) -> None:
     compiler()
     profile = xl.read_profile("motorway-refined")
     unit = exported(version, tmp_path / "driver.fmu", profile=profile.name)
-    context = varying(inputs_of(profile), 300, 3) | {"lane_index": np.ones(300)}
-    for name, values in context.items():  # a unit has no NaN: nobody is far away
-        context[name] = np.where(np.isnan(values), np.inf, values) if name.endswith("_distance") else values
-    seen = {name: np.minimum(values, 1000.0) for name, values in context.items()}
+    context = gentle(inputs_of(profile), 300)
     late = np.maximum(np.arange(300) - round(xl.OffsetStream(profile, 0, rate=100.0).preview / 0.2), 0)
     columns = {name: values[late] for name, values in context.items()}
     table = pd.DataFrame({"drive": "one", "time": 0.2 * np.arange(300), "offset": 0.0, **columns})
     sampled = xl.sample(profile, context=table, seed=3).to_frame()  # without the rows about a change of lanes
     rows = np.round(sampled.time.to_numpy() / 0.2).astype(int)
-    assert len(rows) > 200
-    np.testing.assert_allclose(run(unit, seen, 0.2)[rows, 0], sampled.offset, atol=1e-9, rtol=0.0)
+    known = rows < 300 - round(xl.OffsetStream(profile, 0, rate=100.0).preview / 0.2)  # then `sample` has nothing ahead
+    assert known.sum() > 200
+    np.testing.assert_allclose(run(unit, context, 0.2)[rows[known], 0], sampled.offset[known], atol=1e-9, rtol=0.0)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_slow_driving_and_maneuvers_are_as_of_the_unit_that_calls_python(version: str, tmp_path: Path) -> None:
+def test_slow_driving_maneuvers_and_surprises_are_as_in_live_traffic(version: str, tmp_path: Path) -> None:
     compiler()
-    pytest.importorskip("pythonfmu")
-    pytest.importorskip("pythonfmu3")
     time = 0.05 * np.arange(1600)
     context = {"speed": np.clip(20.0 + 25.0 * np.sin(time / 9.0), 0.0, None), "lane_width": np.full(1600, 3.5)}
     more = {"following": (time % 20.0 > 6.0) | (time < 14.0), "position": 1.5 * np.sin(time)}
-    units = [
-        exported(version, tmp_path / name, *words, profile="motorway-vehicle-2")
-        for name, words in (("c.fmu", ()), ("python.fmu", ("--python",)))
-    ]
-    in_c, in_python = (run(unit, context, 0.05, **more) for unit in units)
-    np.testing.assert_allclose(in_c, in_python, atol=1e-9, rtol=0.0)
+    unit = exported(version, tmp_path / "driver.fmu", profile="motorway-refined")
+    context |= {"lane_index": np.floor(time / 11.0) % 2.0, "is_truck": np.zeros(1600)}
+    context |= {f"{side}_distance": np.where(time % 17.0 < 4.0, 8.0, np.inf) for side in ("left", "right")}
+    traffic, offset, wanted = Alone(xl.read_profile("motorway-refined"), seed=3), 0.0, []
+    for row in range(1600):
+        seen = {name: values[row : row + 1] for name, values in context.items()}
+        follows = more["following"][row : row + 1]
+        place = np.array([offset]) if follows[0] else more["position"][row : row + 1]
+        around = {name: values for name, values in seen.items() if name not in ("speed", "lane_width", "is_truck")}
+        moment = Moment(("one",), seen["speed"], seen["lane_width"], place, follows, np.ones(1, dtype=bool),
+                        np.zeros(1, dtype=bool), context=around)  # fmt: skip
+        moves = traffic.step(0.05 * row, moment)
+        offset = float(moves.offset[0])
+        wanted.append([float(part[0]) for part in moves[:3]])
+    seen = {name: np.minimum(values, 1000.0) for name, values in context.items()}
+    np.testing.assert_allclose(run(unit, seen, 0.05, **more), wanted, atol=1e-9, rtol=0.0)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -255,8 +256,7 @@ def test_instances_are_their_own_and_a_reset_one_begins_anew(version: str, tmp_p
 
 WITHOUT_US = """
 import sys
-for name in ("xosc_lateral", "pythonfmu", "pythonfmu3"):
-    sys.modules[name] = None
+sys.modules["xosc_lateral"] = None
 import fmpy
 from fmpy.validation import validate_fmu
 assert validate_fmu(sys.argv[1]) == []
@@ -315,7 +315,6 @@ def test_a_compiler_that_is_not_there_or_fails_is_told_in_a_line_and_nothing_is_
         assert main(["export", "fmu", "-o", str(tmp_path / "driver.fmu"), "--compiler", words]) == 1
         printed = capsys.readouterr().err
         assert message in printed and printed.count("\n") == 1
-    assert main(["export", "fmu", "-o", str(tmp_path / "driver.fmu"), "--python", "--compiler", "cc"]) == 2
     assert not (tmp_path / "driver.fmu").exists()
 
 

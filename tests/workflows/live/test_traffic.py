@@ -165,7 +165,7 @@ def test_when_all_have_gone_the_next_ones_drive_as_if_they_were_the_first(profil
     ("place", "value"),
     [(("knots",), -(10**9)), (("time",), None), (("time",), "3"), (("drivers", "a", 0), [1e300] * 6),
      (("drivers", "z"), []), (("groups", "", "members"), ["a", "c"]), (("groups", "", "drives"), []),
-     (("groups", "", "drives", 0, "samples"), [float("nan")] * 4), (("groups", "", "responses"), []),
+     (("groups", "", "drives", 0, "command", "samples"), [float("nan")] * 4), (("groups", "", "responses"), []),
      (("groups", "", "drives", 0, "drawn", 0, 0), 1e300), (("columns",), 5), (("seed",), -1), (("knots",), None),
      (("groups", "", "drives", 0, "process", "core", "factors", "quick", "values", 1, 0), 1e12)],
 )  # fmt: skip

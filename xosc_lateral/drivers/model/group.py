@@ -14,13 +14,14 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.limits import LIVE_RANGES
+from xosc_lateral.drivers.model.actuator import Actuator, CommandState
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import terms_of
 from xosc_lateral.drivers.model.effects.response import ResponseState
 from xosc_lateral.drivers.model.linear_filters import extrapolate, piece
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import plain, read_as
-from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine, offsets_of
+from xosc_lateral.drivers.model.sampling import DriveProcess, Movement, combine
 
 ROWS_DRAWN = 64
 """Model steps drawn at once for a driver. [-]"""
@@ -29,11 +30,11 @@ _NO_FACTORS = (0.0, 1.0, 1.0, 1.0)
 """`EffectTerms.parts` that change nothing."""
 
 _DRIVER = np.dtype(
-    [("mean", float), ("at", np.int64), ("left", np.int64), ("row", np.int64), ("samples", float, 4),
+    [("mean", float), ("at", np.int64), ("left", np.int64), ("row", np.int64),
      ("drawn", float, (2 * ROWS_DRAWN, 2 + len(_NO_FACTORS)))]
 )  # fmt: skip
 """Of one driver: what his coarse part moves about [-], which drawn row is next and how many are left, his next model
-step, his last samples [m], rows drawn ahead: coarse and fine movement [lane widths], parts of his hidden effects."""
+step, rows drawn ahead: coarse and fine movement [lane widths], parts of his hidden effects."""
 
 
 class ResponseStreamState(msgspec.Struct, forbid_unknown_fields=True):
@@ -108,7 +109,7 @@ class DriverState(msgspec.Struct, kw_only=True):
     mean: float = 0.0
     drawn: list[list[float]] = msgspec.field(default_factory=list)
     row: int
-    samples: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    command: CommandState = msgspec.field(default_factory=CommandState)
 
 
 def rows_ahead(profile: DriverProfile) -> int:
@@ -138,10 +139,14 @@ class OffsetGroup:
             for number, effect in enumerate(example.columned)
             if set(effect.columns) <= set(self.columns)
         ]
+        columned = [k for k, effect in enumerate(profile.effects, 1) if isinstance(effect, ColumnEffect)]
+        numbers = [columned[response.number] for response in self.responses]
+        self.actuator = Actuator(profile, numbers, is_surprised=not sees_ahead)
         self._rated = any(response.effect.acts is Acts.RATE for response in self.responses)
         example.begin_at(0.0)
         self._hidden = [part is not None for part in example.hidden_terms_at(np.zeros(1, dtype=np.int64)).parts]
         self._drives: list[DriveProcess] = []
+        self._delay, self._widths = delay, list[FloatArray]()  # lane widths that are not yet responded to [m]
         self._state = np.empty(0, dtype=_DRIVER)
 
     def __len__(self) -> int:
@@ -158,6 +163,7 @@ class OffsetGroup:
         for response in self.responses:
             response.join([drive.columned[response.number].coefficients for drive in new])
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
+        self.actuator.join(len(new))
         return new
 
     def keep_present(self, there: BoolArray) -> None:
@@ -168,6 +174,8 @@ class OffsetGroup:
         for response in self.responses:
             response.keep_present(there)
         self._state = self._state[there]
+        self.actuator.keep_present(there)
+        self._widths = [widths[there[: len(widths)]] for widths in self._widths]
 
     def advance(self, context: Mapping[str, FloatArray], width: FloatArray) -> FloatArray:
         """One model step of everybody.
@@ -185,15 +193,16 @@ class OffsetGroup:
             Coefficients in u, from 0 at this moment to 1 at the next, lowest power first, of the offset. [m]
         """
         self.see(context)
-        effects, samples = self._effects(), self._state["samples"]
+        known = [np.concatenate([widths, width[len(widths) :]]) for widths in self._widths]  # to who came, as it is now
+        self._widths = [*known, width][-self._delay - 1 :]
+        effects, width = self._effects(), self._widths[0]
         fresh = np.flatnonzero(self._state["row"] == 0)
         if len(fresh):
             theirs = [terms.rows(fresh) for terms in effects]
             first, second = (self._next(fresh, theirs, width[fresh]) for _ in range(2))
-            samples[fresh] = np.stack([np.zeros(len(fresh)), extrapolate(second, first), first, second], axis=1)
-        sample = self._next(np.arange(len(self)), effects, width)
-        samples[:] = np.concatenate([samples[:, 1:], sample[:, None]], axis=1)
-        return np.stack(np.broadcast_arrays(*piece(*samples.T)), axis=1)
+            self.actuator.state["samples"][fresh, 1] = extrapolate(second, first)
+        self._next(np.arange(len(self)), effects, width)
+        return np.stack(np.broadcast_arrays(*piece(*self.actuator.state["samples"].T)), axis=1)
 
     def see(self, context: Mapping[str, FloatArray], *, before: bool = False) -> None:
         """One more row of context, shape (n,) each: of the drive, or from before it."""
@@ -212,25 +221,35 @@ class OffsetGroup:
         self, drivers: IntArray, effects: Sequence[EffectTerms], width: FloatArray, start: float | None = None
     ) -> FloatArray:
         """The next sample of some drivers, shape (m,). [m]"""
+        if start is not None:
+            hidden = self._drives[int(drivers[0])].hidden_terms_at(np.zeros(1, dtype=np.int64))
+            offset = self._drives[int(drivers[0])].take(combine([hidden, *effects]), width, start)
+        else:
+            movement, hidden = self._moved(drivers, effects)
+            offset = self.actuator.command(drivers, self._state["row"][drivers], movement, hidden, effects, width)
+        self._state["row"][drivers] += 1
+        self.actuator.note(drivers, offset)
+        return offset
+
+    def _moved(self, drivers: IntArray, effects: Sequence[EffectTerms]) -> tuple[Movement, EffectTerms]:
+        """Of some drivers, what is random of their next sample and what their hidden effects do to it, shape (m,)."""
         state = self._state
-        if self._rated or start is not None:  # what the rate of mean reversion acts on can't be drawn ahead
-            taken = []
-            for k, index in enumerate(drivers.tolist()):
-                hidden, row = self._drives[index].hidden_terms_at(state["row"][index : index + 1]), slice(k, k + 1)
-                terms = combine([hidden, *(effect.rows(row) for effect in effects)])
-                taken.append(self._drives[index].take(terms, width[row], start))
-            state["row"][drivers] += 1
-            return np.concatenate(taken)
-        self._draw(drivers)
-        at = state["at"][drivers]
-        drawn = state["drawn"][drivers, at].T
-        state["at"][drivers] = at + 1
-        state["left"][drivers] -= 1
-        state["row"][drivers] += 1
-        if any(self._hidden):
-            hidden = (part if acts else None for part, acts in zip(drawn[2:], self._hidden, strict=True))
-            effects = [EffectTerms(*hidden), *effects]
-        return offsets_of(self.profile, Movement(state["mean"][drivers], drawn[0], drawn[1]), combine(effects), width)
+        if not self._rated:
+            self._draw(drivers)
+            at = state["at"][drivers]
+            drawn = state["drawn"][drivers, at].T
+            state["at"][drivers] = at + 1
+            state["left"][drivers] -= 1
+            own = (part if acts else None for part, acts in zip(drawn[2:], self._hidden, strict=True))
+            return Movement(state["mean"][drivers], drawn[0], drawn[1]), EffectTerms(*own)
+        moves, hides = [], []  # what the rate of mean reversion acts on can't be drawn ahead
+        for k, index in enumerate(drivers.tolist()):
+            hides.append(self._drives[index].hidden_terms_at(state["row"][index : index + 1]))
+            rate = combine([hides[k], *(effect.rows(slice(k, k + 1)) for effect in effects)]).rate
+            moves.append([np.ravel(part)[:1] for part in self._drives[index].movement(1, rate)])
+        parts = zip(*(terms.parts for terms in hides), strict=True)
+        own = (None if part[0] is None else np.concatenate(part) for part in parts)
+        return Movement(*map(np.concatenate, zip(*moves, strict=True))), EffectTerms(*own)
 
     def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
@@ -262,7 +281,7 @@ class OffsetGroup:
         """Draw what comes after all that is drawn; a `ValueError` if a state from outside leads to no offsets."""
         for k, driver in enumerate(self._state):
             next_ = (0.0, driver["drawn"]) if self._rated else self._block(k)
-            for values in (driver["mean"], driver["samples"], driver["drawn"], *next_):
+            for values in (driver["mean"], self.actuator.state["samples"][k], driver["drawn"], *next_):
                 if not np.abs(values).max() <= LIVE_RANGES["offset"].high:
                     raise ValueError(f"drives[{k}]: a number that no driver has")
 
@@ -270,21 +289,23 @@ class OffsetGroup:
     def driver_states(self) -> list[DriverState]:
         """Where everybody is."""
         states = []
-        for drive, driver in zip(self._drives, self._state, strict=True):
+        for drive, driver, asked in zip(self._drives, self._state, self.actuator.states(), strict=True):
             rows = driver["drawn"][driver["at"] : driver["at"] + driver["left"]].tolist()
-            mean, row, samples = float(driver["mean"]), int(driver["row"]), tuple(driver["samples"].tolist())
-            states.append(DriverState(process=drive.state, mean=mean, drawn=rows, row=row, samples=samples))
+            mean, row = float(driver["mean"]), int(driver["row"])
+            states.append(DriverState(process=drive.state, mean=mean, drawn=rows, row=row, command=asked))
         return states
 
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
         responses = [response.state.response for response in self.responses]
-        return plain({"responses": responses, "drives": self.driver_states(), "columns": self.columns})  # type: ignore[no-any-return]
+        known = {"drives": self.driver_states(), "columns": self.columns, "widths": self._widths}
+        return plain({"responses": responses, **known})  # type: ignore[no-any-return]
 
     def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
         responses = read_as(list[ResponseState], state["responses"], "responses")
         drivers = read_as(list[DriverState], state["drives"], "drives")
+        self._widths = read_as(list[FloatArray], state["widths"], "widths")
         self.go_on_from(drivers, [ResponseStreamState(response) for response in responses], seeds)
 
     def go_on_from(
@@ -298,6 +319,7 @@ class OffsetGroup:
             drive.restore(saved.process, f"drives[{k}].process")
             driver, rows = self._state[k], np.reshape(saved.drawn, (-1, 2 + len(_NO_FACTORS)))
             driver["drawn"][: len(rows)], driver["left"] = rows, len(rows)
-            driver["mean"], driver["row"], driver["samples"] = saved.mean, saved.row, saved.samples
+            driver["mean"], driver["row"] = saved.mean, saved.row
+            self.actuator.restore(k, saved.command)
         for response, response_state in zip(self.responses, responses, strict=True):
             response.restore(response_state)

@@ -20,6 +20,7 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.filters import filtered
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -27,6 +28,13 @@ if TYPE_CHECKING:
 
 MINIMUM_LANE_WIDTH = 2.5
 """Where a lane is narrower than this (it opens or closes), an offset is held against a lane of this width. [m]"""
+
+ENDLESS = 1e9
+"""So large is no column; what is twice there of what it is at a thousandth has no end. [any unit]"""
+
+BELIEVED_SPAN = 100.0
+"""Ranges of columns up to this are what there is on roads (lanes, truth values, hours); wider ones bound what a sensor
+can say. [any unit]"""
 
 TRIAL_STEPS, TRIAL_SPEED = 150, 30.0
 """Model steps that a profile is tried with, half a minute [-], and the speed [m/s]."""
@@ -90,7 +98,7 @@ def drives_nobody(name: str, values: FloatArray) -> BoolArray:
 
 
 def check_profile(profile: DriverProfile) -> None:
-    """Try a profile in even traffic: its numbers may each be allowed, and together give nonsense.
+    """Try a profile, in even traffic and each effect over its column: numbers may each be allowed, and give nonsense.
 
     Raises `DriverProfileError` if it leaves its lane by more than a lane.
     """
@@ -102,6 +110,38 @@ def check_profile(profile: DriverProfile) -> None:
     with np.errstate(all="ignore"):
         offset = sample_offsets(profile, Segment(time, width, np.full(TRIAL_STEPS, TRIAL_SPEED)), 0)
     check_offsets(offset, width, subject, time)
+    for number, effect in enumerate(profile.effects, 1):
+        if isinstance(effect, ColumnEffect) and effect.acts is Acts.LOCATION:
+            shift = np.array([_largest_shift(effect, profile)])
+            what = f"profile {profile.name}: effect {number} ({effect.kind} of {', '.join(effect.columns)})"
+            check_offsets(shift, profile.lane_width, what)
+
+
+def _largest_shift(effect: ColumnEffect, profile: DriverProfile) -> float:
+    """What an effect on the location comes to at most, over the range of its columns; 0 where that has no end. [m]
+
+    A column has the range that its effect or its profile was fitted on, else what is believed of it, where that says
+    something. Without one an effect may still level off.
+    """
+    values = [_trial_values(effect, name, profile) for name in effect.columns]
+    grid = dict(zip(effect.columns, map(np.ravel, np.meshgrid(*values)), strict=True))
+    with np.errstate(all="ignore"):
+        strength = np.abs(effect.weighed(effect.known(grid)))
+        far = np.any([np.abs(column) >= ENDLESS for column in grid.values()], axis=0)
+        within = float(np.nanmax(strength[~far]))
+        beyond = float(np.nanmax(strength[far], initial=0.0))
+    return 0.0 if beyond > 2.0 * within and not effect.response_range else max(within, beyond)
+
+
+def _trial_values(effect: ColumnEffect, name: str, profile: DriverProfile) -> FloatArray:
+    measured = {"speed": profile.validity.speed, "lane_width": profile.validity.lane_width}
+    believed = context_range(name)
+    low, high = measured.get(name) or (believed.low, believed.high)
+    if high - low <= BELIEVED_SPAN:
+        return np.union1d(np.linspace(low, high, 41), np.arange(np.ceil(low), high + 0.5))
+    marks = [mark for field in ("levels", "knots", "at", "middle") for mark in np.ravel(getattr(effect, field, ()))]
+    size = np.geomspace(1e-6, ENDLESS / 1e3, 40)
+    return np.unique([*-size, 0.0, *size, *marks, -ENDLESS, ENDLESS, np.inf])
 
 
 # ---- what can be driven: bounds on the lateral acceleration and jerk of lane keeping, by speed ----

@@ -16,6 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import TIME
+from xosc_lateral.drivers.model.actuator import CommandState
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.drivers.model.group import DriverState, OffsetGroup, ResponseStreamState, rows_ahead
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate, piece
@@ -57,6 +58,7 @@ class StreamState(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     process: Any = None  # `DriveState`; None before the first context.
     mean: float = 0.0  # As `drawn`, see `group.DriverState`; 0.2 wrote neither, and kept rows drawn ahead in `process`.
     drawn: list[list[float]] = msgspec.field(default_factory=list)
+    command: CommandState | None = None
 
 
 class OffsetStream:
@@ -66,7 +68,8 @@ class OffsetStream:
     rate, the curve of `upsampling` between them. A driver with preview, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
-    then the driver responds to it `preview` seconds later; what is random is the same.
+    then the driver responds to it `preview` seconds later, to what is sudden over seconds (`actuator`); what is random
+    is the same.
 
     Parameters
     ----------
@@ -182,6 +185,8 @@ class OffsetStream:
         for _ in range(0 if state.samples or state.looked else self._ahead):  # as it is now, it is taken to be ahead
             self._take(context)
         self._take(context)
+        if self._driver is not None:
+            self._driver.actuator.is_surprised = self._ahead > 0 and not state.looked
         if state.factor == 1:
             state.samples = [self._sample()]
             state.curve = (state.samples[0],)
@@ -226,6 +231,7 @@ class OffsetStream:
         if self._driver is not None:
             (driver,) = self._driver.driver_states()
             state.process, state.mean, state.drawn = driver.process, driver.mean, driver.drawn
+            state.command = driver.command
             state.responses = [response.state for response in self._driver.responses]
         whole = sealed(plain(state))
         _SAVED_HASHES[whole["sha256"]] = None
@@ -261,6 +267,7 @@ class OffsetStream:
         if saved.known is not None:
             stream._driver = OffsetGroup(profile, saved.known, sees_ahead=True)
             driver = DriverState(process=saved.process, mean=saved.mean, drawn=saved.drawn, row=saved.row)
+            driver.command = saved.command or driver.command
             stream._driver.go_on_from([driver], saved.responses, [seed])
         return stream
 
@@ -279,6 +286,8 @@ class OffsetStream:
                 if number and state.known is not None:
                     self._advance(context)
                 offsets += np.polynomial.polynomial.polyval(share, state.curve or (0.0,)).tolist()
+        if self._driver is not None and self._driver.actuator.state["fault"].any():
+            raise ValueError("it wants what can't be driven")
         check_offsets(np.array(offsets), width, "the state of an offset stream, in half a minute of even traffic")
 
 

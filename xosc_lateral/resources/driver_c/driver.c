@@ -38,6 +38,11 @@ static uint64_t draw(DRIVER_random *random) {
     return (mixed >> turn) | (mixed << ((64U - turn) & 63U));
 }
 
+/* Whether a number that stands for yes or no says yes. */
+static int is_set(double flag) {
+    return flag > 0.0 || flag < 0.0;
+}
+
 static double uniform(DRIVER_random *random) {
     return (double)(draw(random) >> 11) * (1.0 / 9007199254740992.0);
 }
@@ -389,6 +394,8 @@ typedef struct {
     double location, spread, rate, fine;
 } terms_t;
 
+static const terms_t neutral = {0.0, 1.0, 1.0, 1.0};
+
 static void act(terms_t *terms, int acts, double strength) {
     if (acts == ON_LOCATION) {
         terms->location += strength;
@@ -424,7 +431,7 @@ static double component_of(const component_t *component, const double *columns) 
     int k;
     for (k = 0; k < component->shapes; k++) {
         const double x = columns[component->shape[k].column];
-        product *= shaped(&component->shape[k], isinf(x) && component->levels_off == 0 ? NAN : x);
+        product *= shaped(&component->shape[k], isinf(x) && component->levels_off == 0 ? (double)NAN : x);
     }
     return isnan(product) ? component->reference : product;
 }
@@ -434,8 +441,8 @@ static double seen(const DRIVER_state *driver, int64_t row, int component) {
     return driver->history[(row > 0 ? row : 0) % DRIVER_ROWS][component];
 }
 
-/* What the effects of columns do at a row. */
-static void act_by_columns(DRIVER_state *driver, int64_t row, terms_t *terms) {
+/* How strong each effect of columns acts at a row. */
+static void respond(DRIVER_state *driver, int64_t row, double *strengths) {
     int e, i, k, n, lag = 0;
     for (e = 0; e < EFFECTS; e++) {
         const effect_t *const effect = &effects[e];
@@ -456,9 +463,7 @@ static void act_by_columns(DRIVER_state *driver, int64_t row, terms_t *terms) {
             value = fmin(fmax(value, components[k].low), components[k].high);
             strength += (value - components[k].reference) * driver->coefficients[k];
         }
-        if ((driver->known & effect->columns) == effect->columns) {
-            act(terms, effect->acts, strength);
-        }
+        strengths[e] = (driver->known & effect->columns) == effect->columns ? strength : 0.0;
     }
 }
 
@@ -565,17 +570,133 @@ static void bend_curve(DRIVER_state *driver) {
     driver->curve[5] = 6.0 * rise - 3.0 * slope - 3.0 * next_slope - 0.5 * bend + 0.5 * next_bend;
 }
 
-/* The offset at a row. [m] */
+/* ---- what is asked of a vehicle --------------------------------------------------------------------------------- */
+
+/* What moves a driver at a row: chance, hidden effects, and the lane's width. */
+typedef struct {
+    double coarse, fine, width;
+    terms_t own;
+} moved_t;
+
+enum { LOCATION, SPREAD, FINE, WIDTH, OWN, HEEDED };
+
+static void heed(double *heeded, const terms_t *terms, double width) {
+    heeded[LOCATION] = terms->location;
+    heeded[SPREAD] = terms->spread;
+    heeded[FINE] = terms->fine;
+    heeded[WIDTH] = width;
+    heeded[OWN] = 1.0;
+}
+
+/* Where a driver is under a context that he heeds. [m] */
+static double offset_under(const DRIVER_state *driver, const moved_t *moved, const double *heeded) {
+    const double by_lane = fmin(heeded[WIDTH], WIDEST_LANE), by_hand = FINE_WIDTH > 0.0 ? FINE_WIDTH : by_lane;
+    const double coarse = driver->mean + moved->own.spread * heeded[SPREAD] * (moved->coarse - driver->mean);
+    const double fine = moved->own.fine * heeded[FINE] * moved->fine;
+    return heeded[OWN] > 0.0 ? coarse * by_lane + fine * by_hand + (moved->own.location + heeded[LOCATION]) : 0.0;
+}
+
+/* Who wants too much goes on as if there were no context; if that is too much, to the lane's centre. */
+static void heed_less(DRIVER_state *driver, const moved_t *moved, const double *strengths, double reach, double *heeded) {
+    double alone, worst = 0.0;
+    int e;
+    heed(heeded, &neutral, moved->width);
+    alone = offset_under(driver, moved, heeded);
+    driver->fault = DRIVER_MOVEMENT_FAULT;
+    if (!(fabs(alone) <= reach)) {
+        heeded[OWN] = 0.0;
+        return;
+    }
+    for (e = 0; e < EFFECTS; e++) { /* which effect is it? */
+        double one[HEEDED], shift;
+        terms_t terms = neutral;
+        act(&terms, effects[e].acts, strengths[e]);
+        heed(one, &terms, moved->width);
+        shift = fabs(offset_under(driver, moved, one) - alone);
+        shift = isnan(shift) ? (double)INFINITY : shift;
+        if (shift > worst) {
+            worst = shift;
+            driver->fault = effects[e].number;
+        }
+    }
+}
+
+/* The speed from which one stops after just a way. [m/s] */
+static double stopping_speed(double way, double push) {
+    const double left = fmax(way, 0.0), change = push * DRIVER_STEP;
+    const double further = floor(sqrt(0.25 + 2.0 * left / (change * DRIVER_STEP)) - 0.5); /* steps after the first */
+    return left / (DRIVER_STEP * (further + 1.0)) + 0.5 * change * further;
+}
+
+/* Pay off what is owed: at once where that is slow and soft enough, else as fast as one can and still stop there. */
+static void pay_off(DRIVER_state *driver) {
+    const double change = RESPONSE_ACCELERATION * DRIVER_STEP;
+    double wanted = driver->owed / DRIVER_STEP;
+    if (fabs(wanted - driver->pace) <= change && fabs(wanted) <= RESPONSE_SPEED) {
+        driver->owed = 0.0;
+        driver->pace = wanted;
+        return;
+    }
+    if (fabs(driver->owed) > change * DRIVER_STEP) {
+        wanted = fmin(RESPONSE_SPEED, stopping_speed(fabs(driver->owed), RESPONSE_ACCELERATION));
+        wanted = copysign(wanted, driver->owed);
+    }
+    driver->pace += fmin(fmax(wanted - driver->pace, -change), change);
+    driver->owed -= driver->pace * DRIVER_STEP;
+}
+
+/* The next offset as near to the wanted one as can be driven. [m] */
+static double drivable_step(const DRIVER_state *driver, double wanted, double reach) {
+    const double last = driver->samples[3], speed = (last - driver->samples[2]) / DRIVER_STEP;
+    const double change = LARGEST_ACCELERATION * DRIVER_STEP;
+    const double out = fmin(LARGEST_SPEED, stopping_speed(reach - last, LARGEST_ACCELERATION));
+    const double back = fmin(LARGEST_SPEED, stopping_speed(reach + last, LARGEST_ACCELERATION));
+    const double aim = fmin(fmax((wanted - last) / DRIVER_STEP, -back), out);
+    return last + DRIVER_STEP * fmin(fmax(aim, speed - change), speed + change);
+}
+
+/* The offset at a row, by all that acts on the driver. [m] */
 static double sample_at(DRIVER_state *driver, int64_t row) {
-    terms_t terms = {0.0, 1.0, 1.0, 1.0};
-    const double width = seen(driver, row, DRIVER_COMPONENTS), by_lane = fmin(width, WIDEST_LANE);
-    const double by_hand = FINE_WIDTH > 0.0 ? FINE_WIDTH : by_lane;
-    double coarse;
-    act_hidden(driver, row, &terms);
-    act_by_columns(driver, row, &terms);
-    coarse = RATED != 0 ? coarse_at_rate(driver, terms.rate) : next_coarse(driver);
-    coarse = driver->mean + terms.spread * (coarse - driver->mean);
-    return coarse * by_lane + terms.fine * next_fine(driver) * by_hand + terms.location;
+    const double *const s = driver->samples;
+    moved_t moved;
+    terms_t terms = neutral;
+    double strengths[EFFECTS + 1], heeded[HEEDED], wanted, reach;
+    int e, is_wild, foresees = driver->foresees != 0;
+    moved.own = neutral;
+    moved.width = seen(driver, row, DRIVER_COMPONENTS);
+    act_hidden(driver, row, &moved.own);
+    respond(driver, row, strengths);
+    for (e = 0; e < EFFECTS; e++) {
+        act(&terms, effects[e].acts, strengths[e]);
+    }
+    moved.coarse = RATED != 0 ? coarse_at_rate(driver, moved.own.rate * terms.rate) : next_coarse(driver);
+    moved.fine = next_fine(driver);
+    heed(heeded, &terms, moved.width);
+    wanted = offset_under(driver, &moved, heeded);
+    reach = OFFSET_LANES * fmax(moved.width, MINIMUM_LANE_WIDTH);
+    is_wild = !(fabs(wanted) <= reach);
+    if (is_wild != 0) {
+        heed_less(driver, &moved, strengths, reach, heeded);
+        wanted = offset_under(driver, &moved, heeded);
+    }
+    if (foresees == 0 || is_wild != 0 || fabs(driver->owed) > 0.0) {
+        const int first = foresees != 0 ? OWN : LOCATION; /* who knows what comes responds as he does */
+        if (driver->heeded[WIDTH] > 0.0 && memcmp(heeded + first, driver->heeded + first, (size_t)(HEEDED - first) * sizeof *heeded) != 0) {
+            const double was = offset_under(driver, &moved, driver->heeded);
+            driver->owed += wanted - (isnan(was) ? 0.0 : fmin(fmax(was, -reach), reach));
+        }
+        memcpy(driver->heeded, heeded, sizeof heeded);
+        pay_off(driver);
+    }
+    wanted -= driver->owed;
+    if (foresees == 0 && is_wild == 0 && row >= 2
+        && fabs(wanted - 2.0 * s[3] + s[2]) > IMPOSSIBLE_ACCELERATION * (DRIVER_STEP * DRIVER_STEP)) {
+        driver->fault = DRIVER_MOVEMENT_FAULT;
+    }
+    if (driver->fault != 0) {
+        wanted = row >= 2 ? drivable_step(driver, wanted, reach) : fmin(fmax(wanted, -reach), reach);
+    }
+    return wanted;
 }
 
 /* One more row of context, and the sample that it completes. */
@@ -636,7 +757,7 @@ static void move(DRIVER_state *driver, double u, double passed, const DRIVER_inp
     const double *const c = driver->curve;
     const double own = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))));
     const double slope = c[1] + u * (2.0 * c[2] + u * (3.0 * c[3] + u * (4.0 * c[4] + u * 5.0 * c[5])));
-    const int follows = in->following != 0.0, followed = driver->was_following != 0.0;
+    const int follows = is_set(in->following), followed = is_set(driver->was_following);
     double pace = fabs(in->speed) / MINIMUM_SPEED, rate, rest_rate;
     pace = pace > 1.0 - 1e-6 ? 1.0 : pace * pace * (3.0 - 2.0 * pace);
     rate = slope / DRIVER_STEP * pace;
@@ -679,7 +800,7 @@ static unsigned fault_of(const DRIVER_inputs *inputs, double *columns) {
     if (isnan(inputs->following)) {
         fault = FAULT_FOLLOWING;
     }
-    if (inputs->following == 0.0 && !(fabs(inputs->position) <= FARTHEST_POSITION)) {
+    if (!is_set(inputs->following) && !(fabs(inputs->position) <= FARTHEST_POSITION)) {
         fault = FAULT_POSITION;
     }
     for (k = 0; k < COLUMNS; k++) {
@@ -719,12 +840,13 @@ DRIVER_status DRIVER_start(DRIVER_state *driver, uint64_t seed, uint32_t drive, 
 
 DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs) {
     double columns[COLUMNS];
-    unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : FAULT_START;
+    unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : (unsigned)FAULT_START;
     if (fault == 0U && (driver->looked >= DRIVER_LOOKS || driver->stepped != 0)) {
         fault = FAULT_LOOKS;
     }
     if (fault == 0U) {
         driver->looked++;
+        driver->foresees = 1;
         take_row(driver, columns);
     }
     return refused(driver, fault);
@@ -733,7 +855,7 @@ DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs) {
 DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs *inputs, DRIVER_outputs *outputs) {
     double columns[COLUMNS], passed;
     int64_t due;
-    unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : FAULT_START;
+    unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : (unsigned)FAULT_START;
     if (fault == 0U && driver->looked != 0 && driver->looked != DRIVER_LOOKS) {
         fault = FAULT_LOOKS;
     }
@@ -762,6 +884,14 @@ DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs
 
 const char *DRIVER_message(const DRIVER_state *driver) {
     return driver->message < FAULTS ? faults[driver->message] : faults[FAULT_START];
+}
+
+unsigned DRIVER_fault(const DRIVER_state *driver) {
+    return driver->fault > 0 && driver->fault <= DRIVER_MOVEMENT_FAULT ? (unsigned)driver->fault : 0U;
+}
+
+const char *DRIVER_fault_message(const DRIVER_state *driver) {
+    return impossible[DRIVER_fault(driver)];
 }
 
 static uint64_t checksum(const unsigned char *bytes) {

@@ -30,8 +30,12 @@ extern "C" {
 #define DRIVER_SAVED (DRIVER_MEMORY + 16)
 
 /* How far ahead of its time the driver has to be told the context, to respond when `sample` does. [s] A driver who is
- * not told responds so much later; what is random is the same. It is DRIVER_LOOKS calls of DRIVER_look, 0.2 s each. */
+ * not told responds so much later, and to what is sudden over seconds; what is random is the same. It is DRIVER_LOOKS
+ * calls of DRIVER_look, 0.2 s each. */
 #define DRIVER_PREVIEW @PREVIEW@
+
+/* Fault of a driver whose movement, without any context, can't be driven. */
+#define DRIVER_MOVEMENT_FAULT @MOVEMENT_FAULT@
 
 /* Every column that the profile reads is known. */
 #define DRIVER_ALL_KNOWN UINT64_C(@ALL_KNOWN@)
@@ -73,7 +77,7 @@ typedef struct {
 /* A driver: fields are the library's alone. */
 typedef struct {
     uint64_t profile, known, message;
-    int64_t rows, knots, drawn, left, fine_row, looked, stepped, bin;
+    int64_t rows, knots, drawn, left, fine_row, looked, stepped, bin, foresees, fault;
     double begun_at, time, own_time;
     DRIVER_random coarse_random, fine_random;
     DRIVER_factors factors[2];
@@ -82,7 +86,7 @@ typedef struct {
     DRIVER_hidden_state hidden[DRIVER_HIDDEN];
     double coefficients[DRIVER_COMPONENTS], history[DRIVER_ROWS][DRIVER_COMPONENTS + 1], settled[DRIVER_LAGS];
     double samples[4], curve[6];
-    double was_following, place, own, rest, from, from_rate, share, over, slip;
+    double was_following, place, own, rest, from, from_rate, share, over, slip, heeded[5], owed, pace;
 } DRIVER_state;
 
 /* A lane of the profile's own width, at 30 m/s, and nobody around. */
@@ -102,6 +106,11 @@ DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs
 
 /* Why the last call was refused; "" if it was not. */
 const char *DRIVER_message(const DRIVER_state *driver);
+
+/* What wanted what can't be driven, so that the driver is held back: the number of an effect in the profile, from 1, or
+ * DRIVER_MOVEMENT_FAULT; 0: nothing. The same in words. */
+unsigned DRIVER_fault(const DRIVER_state *driver);
+const char *DRIVER_fault_message(const DRIVER_state *driver);
 
 /* To DRIVER_SAVED bytes, and back on a machine of the same byte order. */
 void DRIVER_save(const DRIVER_state *driver, unsigned char *bytes);

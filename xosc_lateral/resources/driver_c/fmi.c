@@ -29,7 +29,7 @@ typedef const uint32_t *references_t;
 typedef const char *text_t;
 
 /* Variables by their value reference. */
-enum { INPUTS = sizeof(DRIVER_inputs) / sizeof(double), FOLLOWING = INPUTS - 1, OUTPUTS = INPUTS, SEED = INPUTS + 3, TIME, VARIABLES };
+enum { INPUTS = sizeof(DRIVER_inputs) / sizeof(double), FOLLOWING = INPUTS - 1, OUTPUTS = INPUTS, SEED = INPUTS + 3, FAULT, TIME, VARIABLES };
 
 /* Distances that are not there from @ABSENT@ m on: 1 by infinity, 2 by NAN. */
 static const int is_distance[INPUTS] = {@DISTANCES@};
@@ -59,15 +59,18 @@ typedef struct {
     char name[64];
 } unit_t;
 
-static status_t failed(const void *instance, const char *message) {
-    const unit_t *const unit = (const unit_t *)instance;
+static void say(const unit_t *unit, status_t status, const char *category, const char *message) {
     if (unit->log != NULL) {
 #if @FMI@ == 2
-        unit->log(unit->environment, unit->name, ERROR, "logStatusError", "%s", message);
+        unit->log(unit->environment, unit->name, (int)status, category, "%s", message);
 #else
-        unit->log(unit->environment, ERROR, "logStatusError", message);
+        unit->log(unit->environment, (int)status, category, message);
 #endif
     }
+}
+
+static status_t failed(const void *instance, const char *message) {
+    say((const unit_t *)instance, ERROR, "logStatusError", message);
     return ERROR;
 }
 
@@ -104,7 +107,7 @@ static status_t go_to(unit_t *unit, double time) {
     double seen[INPUTS];
     int k;
     for (k = 0; k < INPUTS; k++) {
-        const double absent = is_distance[k] == 1 ? INFINITY : NAN;
+        const double absent = is_distance[k] == 1 ? (double)INFINITY : (double)NAN;
         seen[k] = is_distance[k] != 0 && memory->values[k] >= @ABSENT@ ? absent : memory->values[k];
     }
     memcpy(&inputs, seen, sizeof inputs);
@@ -112,6 +115,10 @@ static status_t go_to(unit_t *unit, double time) {
         return failed(unit, DRIVER_message(&memory->driver));
     }
     memcpy(memory->values + OUTPUTS, &outputs, sizeof outputs);
+    if (fabs((double)DRIVER_fault(&memory->driver) - memory->values[FAULT]) > 0.0) { /* said once, and the unit goes on */
+        memory->values[FAULT] = (double)DRIVER_fault(&memory->driver);
+        say(unit, WARNING, "logStatusWarning", DRIVER_fault_message(&memory->driver));
+    }
     memory->values[TIME] = time;
     return OK;
 }
@@ -131,7 +138,7 @@ static status_t step_on(unit_t *unit, double time, double length) {
     if (memory->driver.profile == 0U) {
         return failed(unit, "a step before the end of initialization mode");
     }
-    if (memory->stepped == 0.0 && time != memory->values[TIME]) { /* not every tool says before when it all begins */
+    if (!(memory->stepped > 0.0) && fabs(time - memory->values[TIME]) > 0.0) { /* not every tool says before when it all begins */
         memory->values[TIME] = time;
         status = begin(unit);
     }
@@ -146,7 +153,7 @@ static status_t transfer(void *instance, references_t references, size_t count, 
     size_t k;
     for (k = 0; k < count; k++) {
         const uint32_t r = references[k];
-        const kind_t its = r == SEED ? WHOLE : r == FOLLOWING ? TRUTH : NUMBER;
+        const kind_t its = r == SEED || r == FAULT ? WHOLE : r == FOLLOWING ? TRUTH : NUMBER;
         if (r >= VARIABLES || its != kind || (sets != 0 && r >= OUTPUTS && r != SEED)) {
             return failed(unit, "a value reference of no variable of that type, or one that can't be set");
         }
@@ -164,7 +171,7 @@ static status_t transfer(void *instance, references_t references, size_t count, 
         } else if (sets != 0) {
             own[r] = ((truth_t *)values)[k] ? 1.0 : 0.0;
         } else {
-            ((truth_t *)values)[k] = own[r] != 0.0;
+            ((truth_t *)values)[k] = own[r] > 0.0;
         }
     }
     return OK;

@@ -69,6 +69,7 @@ def c_sources(profile: DriverProfile) -> dict[str, str]:
             f"#define DRIVER_KNOWS_{field} UINT64_C({1 << k})" for k, field in enumerate(fields.values())
         ),
         "ALL_KNOWN": str((1 << len(fields)) - 1),
+        "MOVEMENT_FAULT": str(len(profile.effects) + 1),
     }
     return {
         f"{name}.h": filled("driver.h", profile, words),
@@ -101,4 +102,4 @@ def _memory(sizes: Mapping[str, int]) -> int:
     """Bytes of `DRIVER_state`, whose fields all have eight; the C compiler checks it."""
     history = sizes["ROWS"] * (sizes["COMPONENTS"] + 1)
     per_size = sum(sizes[name] for name in ("STEPS", "EVERY", "TAPS", "COMPONENTS", "LAGS")) + 10 * sizes["HIDDEN"]
-    return 8 * (90 + history + per_size)
+    return 8 * (99 + history + per_size)

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, context_range
+from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, OFFSET_LANES, TIME, context_range
 from xosc_lateral.base.names import in_c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.model import actuator
 from xosc_lateral.drivers.model import effects as kinds
 from xosc_lateral.drivers.model.core.autoregressive.model import HEADROOM, KNEE_SHARE, AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
@@ -29,6 +30,7 @@ from xosc_lateral.drivers.model.effects.base import LOG_LIMIT
 from xosc_lateral.drivers.model.effects.response import split_shift
 from xosc_lateral.drivers.model.group import rows_ahead
 from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD
+from xosc_lateral.drivers.model.plausibility import MINIMUM_LANE_WIDTH
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
 from xosc_lateral.workflows.live import paths
@@ -97,6 +99,9 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
         "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
         "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER_SHARE * paths.LARGEST_TURN_RATE,
+        "OFFSET_LANES": OFFSET_LANES.value, "MINIMUM_LANE_WIDTH": MINIMUM_LANE_WIDTH,
+        **{name: getattr(actuator, name) for name in ("RESPONSE_SPEED", "RESPONSE_ACCELERATION", "LARGEST_SPEED",
+                                                      "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
         "STEP_PEAK": paths.STEP_PEAK, "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         **seeds,
     }  # fmt: skip
@@ -117,6 +122,8 @@ def _inputs(profile: DriverProfile) -> list[str]:
     columns = inputs_of(profile)
     usual_values = [*(usual(profile, column) for column in columns), 0.0, 1.0]
     rows, texts = [], ["", *FAULTS.values()]
+    wishes = (actuator.fault_in_words(profile, fault) for fault in range(1, len(profile.effects) + 2))
+    impossible = ["", *(f"{what} wanted what can't be driven: the driver is held back" for what in wishes)]
     for column in columns:
         believed = context_range(column)
         rows.append(f"{{{_number(believed.low)}, {_number(believed.high)}, {int(column in DISTANCES)}}}")
@@ -129,6 +136,7 @@ def _inputs(profile: DriverProfile) -> list[str]:
         "enum { FAULT_NONE, "
         + ", ".join(f"FAULT_{name}" for name in FAULTS)
         + f", FAULT_COLUMNS, FAULTS = FAULT_COLUMNS + {len(columns)} }};",
+        "static const char *const impossible[] = {" + ",\n    ".join(map(in_c, impossible)) + "};",
         "static const char *const faults[] = {" + ",\n    ".join(map(in_c, texts)) + "};",
     ]
 
@@ -141,7 +149,7 @@ def _number(value: object) -> str:
         return str(int(value))
     number = float(value)  # type: ignore[arg-type]
     if np.isinf(number):
-        return "INFINITY" if number > 0 else "-INFINITY"
+        return "(double)INFINITY" if number > 0 else "-(double)INFINITY"
     return repr(number)
 
 
@@ -259,9 +267,10 @@ def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> 
         ]
         order = effect.response_order if effect.response_s > 0 else 0
         keep = float(np.exp(-step / effect.response_s)) if order else 0.0
+        number = next(k for k, one in enumerate(profile.effects, 1) if one is effect)
         mask = sum(1 << columns.index(column) for column in set(effect.columns))
         numbers = (f"ON_{effect.acts.name}", len(components), len(quantity), len(shifts), len(late), order,
-                   int(any(effect.between_drivers)), keep, f"UINT64_C({mask})")  # fmt: skip
+                   int(any(effect.between_drivers)), number, keep, f"UINT64_C({mask})")  # fmt: skip
         effects.append("{" + ", ".join(map(_number, numbers)) + "}")
         components += [_component(effect, k, shapes, columns) for k, shapes in enumerate(quantity)]
         shifts += late
@@ -277,16 +286,17 @@ def _effects(profile: DriverProfile, columned: Sequence[kinds.ColumnEffect]) -> 
         "typedef struct { double reference, coefficient, between, low, high; int levels_off, shapes; "
         "shape_t shape[2]; } component_t;",
         "typedef struct { int whole; double share, weight; } shift_t;",
-        "typedef struct { int acts, first, components, first_shift, shifts, order, differs; double keep; "
+        "typedef struct { int acts, first, components, first_shift, shifts, order, differs, number; double keep; "
         "uint64_t columns; } effect_t;",
-        _structs("component_t components", components),
-        _structs("shift_t shifts", shift_rows),
-        _structs("effect_t effects", effects),
+        _structs("component_t components", components, "{0, 0, 0, 0, 0, 0, 0, {{0, 0, 0, 0}, {0, 0, 0, 0}}}"),
+        _structs("shift_t shifts", shift_rows, "{0, 0, 0}"),
+        _structs("effect_t effects", effects, "{0, 0, 0, 0, 0, 0, 0, 0, 0, 0}"),
     ]
 
 
-def _structs(what: str, rows: Sequence[str]) -> str:
-    return f"static const {what}[] = {{\n    " + ",\n    ".join(rows or ["{0}"]) + "};"
+def _structs(what: str, rows: Sequence[str], none: str) -> str:
+    """A constant array of structs; C has none without an element."""
+    return f"static const {what}[] = {{\n    " + ",\n    ".join(rows or [none]) + "};"
 
 
 def _component(effect: kinds.ColumnEffect, k: int, shapes: Sequence[Shape], columns: Sequence[str]) -> str:
@@ -307,7 +317,7 @@ def _hidden(profile: DriverProfile, hidden: Sequence[kinds.HiddenEffect]) -> lis
     return [
         "enum { ADAPTED, POPULATION, JUMP, TREND, SMOOTH, DRIFT, CYCLE, REGIMES" + f", HIDDEN = {len(hidden)} }};",
         "typedef struct { int kind, first; } hidden_t;",
-        _structs("hidden_t hidden", rows),
+        _structs("hidden_t hidden", rows, "{0, 0}"),
         _array("hidden_numbers", numbers),
     ]
 

@@ -11,18 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.workflows.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
 if TYPE_CHECKING:
     from xosc_lateral.workflows.live.scene import Scene
-    from xosc_lateral.world.scenario.entity import Entity
 
 STATE_COLUMNS = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
-
-EXTERNAL_CONTROLLERS = (1, 11)
-"""Controllers of esmini that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
 TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")
 """The same with what only a trace has."""
@@ -64,9 +61,7 @@ def live_esmini(
     if not Path(scenario).is_file():
         raise FileNotFoundError(2, "No such file or directory", str(scenario))
     player = open_player(library, scenario, window=window)
-    rows: list[tuple[Any, ...]] = []
     events: list[tuple[float, str, int]] = []
-    waiting: dict[str, set[tuple[float, float]]] = {}
     try:
 
         def note(_name: bytes, _kind: int, state: int, path: bytes) -> None:
@@ -77,28 +72,17 @@ def live_esmini(
             on_element=note,
         )  # fmt: skip
         traffic.steer(0.0)
-        for k in range(round(duration / step) + 1):
-            time = player.SE_GetSimulationTime()
-            for name, state in traffic.states().items():
-                move = traffic.moves.get(name, (float("nan"), False))
-                place = (state.road, state.lane, state.s, traffic.offset_of(state))
-                pose = (state.x, state.y, state.h, state.speed)
-                rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
-                if state.ctrl_type in EXTERNAL_CONTROLLERS:
-                    waiting.setdefault(name, set()).add(pose[:2])
-            if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
-                break
-            traffic.steer(step)
-            if player.SE_StepDT(step) != 0:
-                raise SimulationError(f"{scenario}: {player.where} stopped at {time:g} s")
-            traffic.settle(step)
+        rows = run_to_end(traffic, duration, step)
     finally:
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
     scene = Scene(traffic.entities, lambda: traffic.network, ego)
+    standing = [name for name in sorted(traffic.waits) if len({row[2:4] for row in rows if row[1] == name}) == 1]
     stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
-             "with EsminiTraffic" for name, places in waiting.items() if len(places) == 1]  # fmt: skip
-    return LiveRun(rows, settings, [*traffic.warnings, *stood], scene, events)
+             "with EsminiTraffic" for name in standing]  # fmt: skip
+    warnings = [*traffic.warnings, *traffic.traffic.fault_lines(), *stood]
+    notes = [*later_actions(Path(scenario), traffic.spans, duration), *not_driven(traffic.undriven)]
+    return LiveRun(rows, settings, warnings, scene, events, notes)
 
 
 @declare_options
@@ -122,7 +106,7 @@ def live_sumo(
     `SimulationError` in one line.
     """
     from xosc_lateral.workflows.conversion.result import Neighbours
-    from xosc_lateral.workflows.live.scene import Scene, sumo_entity, sumo_network
+    from xosc_lateral.workflows.live.scene import Scene, sumo_network
     from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 
     chosen = given_profile(profile, folders)
@@ -131,47 +115,30 @@ def live_sumo(
         raise FileNotFoundError(2, "No such file or directory", str(config))
     sublane = [] if lateral_resolution is None else ["--lateral-resolution", f"{lateral_resolution:g}"]
     connection = start(["-c", str(config), *sublane, *options])
-    rows: list[tuple[Any, ...]] = []
-    entities: dict[str, Entity] = {}
-    time = 0.0
-    collisions = teleports = 0
     try:
         net = str(connection.simulation.getOption("net-file"))
         traffic = SumoTraffic(
             connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
         )
-        end = float(connection.simulation.getTime()) + duration
+        end = traffic.time() + duration
         configured = float(connection.simulation.getEndTime())  # of which SUMO makes nothing by itself here
         end = min(end, configured) if configured > 0.0 else end
-        while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
-            traffic.steer()
-            connection.simulationStep()
-            time = float(connection.simulation.getTime())
-            collisions += len(connection.simulation.getCollisions())
-            teleports += connection.simulation.getStartingTeleportNumber()
-            for name, x, y, h, speed, lane, s, offset in traffic.states():
-                move = traffic.moves.get(name, (float("nan"), False))
-                edge, _, index = lane.rpartition("_")
-                z = float(connection.vehicle.getPosition3D(name)[2])
-                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, *move, z, 0.0, 0.0))
-                if name not in entities:
-                    entities[name] = sumo_entity(connection.vehicle, name)
+        rows, time = run_to_end(traffic, end, float(connection.simulation.getDeltaT())), traffic.time()
     finally:
         connection.close()
-    if strangers := sorted({*ego, *others} - entities.keys()):
-        seen = f"; there were {', '.join(sorted(entities)[:5])} ..." if entities else ""
+    if strangers := sorted({*ego, *others} - traffic.entities.keys()):
+        seen = f"; there were {', '.join(sorted(traffic.entities)[:5])} ..." if traffic.entities else ""
         raise SimulationError(f"{config}: no vehicle {strangers[0]!r} until {time:g} s{seen}")
     settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
-    warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
-                if count]  # fmt: skip
-    scene = Scene(tuple(entities.values()), partial(sumo_network, net), ego, is_road=False)
-    return LiveRun(rows, settings, [*traffic.warnings, *warnings], scene)
+    counts = [f"SUMO reports {count} {what}" for what, count in traffic.counts.items() if count]
+    scene = Scene(tuple(traffic.entities.values()), partial(sumo_network, net), ego, is_road=False)
+    return LiveRun(rows, settings, [*traffic.warnings, *traffic.traffic.fault_lines(), *counts], scene)
 
 
 class LiveRun(Result):
     """A run of a simulation with drivers in it."""
 
-    __slots__ = ("_rows", "_scene", "_settings", "events", "warnings")
+    __slots__ = ("_rows", "_scene", "_settings", "events", "notes", "warnings")
 
     def __init__(
         self,
@@ -180,6 +147,7 @@ class LiveRun(Result):
         warnings: Sequence[str],
         scene: Scene,
         events: Sequence[tuple[float, str, int]] = (),
+        notes: Sequence[str] = (),
     ) -> None:
         self._rows = pd.DataFrame(rows, columns=list(TRACE_COLUMNS))
         self._settings, self._scene = dict(settings), scene
@@ -187,6 +155,8 @@ class LiveRun(Result):
         """What a user has to know, a line each."""
         self.events = tuple(events)
         """Changes of storyboard elements: time [s], path, state."""
+        self.notes = tuple(notes)
+        """What else drivers did or did not, a line each."""
 
     def headline(self) -> str:
         """One line."""
@@ -197,7 +167,8 @@ class LiveRun(Result):
         return f"{source}: {time:g} s, {steered} of {names} vehicles driven by {profile}, seed {seed}"
 
     def __str__(self) -> str:
-        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+        lines = [("warning", line) for line in self.warnings] + [("note", line) for line in self.notes]
+        return "\n".join([self.headline(), *(f"  {word}: {line}" for word, line in lines)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per vehicle and step, see `STATE_COLUMNS`; SI units, offsets positive left of travel."""
@@ -205,7 +176,7 @@ class LiveRun(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""
-        return {"rows": len(self._rows), "warnings": list(self.warnings), **self._settings}
+        return {"rows": len(self._rows), "warnings": list(self.warnings), "notes": list(self.notes), **self._settings}
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""

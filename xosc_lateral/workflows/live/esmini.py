@@ -1,21 +1,20 @@
 """Drivers in esmini, through the library that its user has (``libesminiLib.so``, ``esminiLib.dll``), by ctypes.
 
-A vehicle's lateral place is reported as t in road coordinates: that alone leaves its speed, maneuvers and triggers as
-written. A report by lane marks the longitudinal direction as reported as well, and stops the vehicle. Where a lateral
-action runs, nothing is reported: both would write the same place.
+A vehicle's lateral place is reported as t in road coordinates, together with the speed as it is read: that leaves its
+speed, maneuvers and triggers as written. Without the speed the player makes one of the way aside, of a car that stands;
+a report by lane marks the longitudinal direction as reported, and stops the vehicle. Where a lateral action runs,
+nothing is reported: both would write the same place. Whose place is whose: `esmini_places`.
 """
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -23,6 +22,8 @@ from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
+from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, Told
+from xosc_lateral.workflows.live.loop import Row
 from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
@@ -35,6 +36,7 @@ from xosc_lateral.world.scenario.private_actions import (
     TeleportAction,
 )
 from xosc_lateral.world.scenario.scenario import Scenario
+from xosc_lateral.world.surroundings.around import smooth_step
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
 LATERAL_ACTIONS = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
@@ -49,30 +51,15 @@ _ACTION_TYPE, _RUNNING_STATE = 7, 2
 _VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 """`Object::Type`; `Vehicle::Category` of trucks, trailers and buses, and of what has no driver of its own."""
 
+EXTERNAL_CONTROLLERS = (1, 11)
+"""Controllers that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
-class _Lane(NamedTuple):
-    """Where a vehicle is."""
+MIDDLE = 0.5
+"""So near to the middle of the road, what is left of a lateral speed fades: a place reported beyond it is one of the
+oncoming lane, where a lane change across goes astray. [m]"""
 
-    place: tuple[int, int]  # Road and lane.
-    is_lane: bool
-    is_driving: bool
-    direction: float  # +1 where +t is to the left of where the vehicle drives, else -1.
-    width: float  # [m]
-    heading: float  # Of travel. [rad]
-
-
-@dataclass(slots=True)
-class _Rest:
-    """What is left of the lateral speed at a maneuver's start."""
-
-    rate: float  # At its start. [m/s]
-    over: float  # It runs out over so long. [s]
-    passed: float = 0.0  # [s]
-    way: float = 0.0  # Beside the maneuver so far. [m]
-
-
-LANE_STEP = 0.5
-"""By more than this the offset changes when another lane is under a vehicle; at joints of roads it does by less. [m]"""
+AT_REST = 1e-6
+"""Of what stands, as the player has it, every way aside becomes a speed: nothing is reported. [m/s]"""
 
 _SAME_PLACE = 0.05
 """A maneuver that moves a vehicle further in its first step puts it elsewhere, as a teleport does. [m]"""
@@ -109,19 +96,23 @@ class EsminiTraffic:
         self._moved_by = lateral_actions(model)
         self._running: Counter[str] = Counter()
         self._touched: set[str] = set()
-        self._base: dict[str, float] = {}
-        self._rates: dict[str, float] = {}  # of who is driven, lateral [m/s]
-        self._rests: dict[str, _Rest] = {}
-        self._lane_of: dict[str, _Lane] = {}
+        self._begun: dict[str, float] = {}
+        self.spans: dict[str, list[tuple[float, float]]] = {}
+        """From when to when lateral actions ran that are over, by their path in the storyboard. [s]"""
         self._also = on_element
         self.warnings: list[str] = []
         """What a user has to know, a line each."""
+        self.waits: set[str] = set()
+        """Vehicles whose controller waits for another program."""
+        self.undriven: dict[str, str] = {}
+        """Vehicles that no driver of ours has had so far, and why."""
+        self._said: set[tuple[str, str]] = set()
         path = (self.player.SE_GetODRFilename() or b"").decode()
         try:
             self.network = read_opendrive(path)
         except (FormatError, OSError) as error:
             raise SimulationError(f"{self.player.where}: its road can't be read: {error}") from error
-        self._roads = {name: index for index, name in enumerate(self.network.road_ids)}
+        self._ledger = Ledger(self.network, self._say)
         left_hand = any(road.rule == "LHT" for road in self.network.roads)
         self.traffic = Traffic(
             profile, profiles=profiles, seed=seed, roads=OpenDriveRoads(self.network), neighbours=neighbours,
@@ -129,11 +120,16 @@ class EsminiTraffic:
         )  # fmt: skip
         self._back = StoryboardCallback(self._on_element)
         self.player.SE_RegisterStoryBoardElementStateChangeCallback(self._back)
+        for element in self.player.heard:  # what began within SE_Init
+            self._follow_action(*element)
+        self._touched.clear()  # what is over by now has put everybody where he begins
         names = {name for name, _ in self._objects()}
         if missing := sorted((self._ego | set(profiles or {})) - names):
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
         self.moves: dict[str, tuple[float, bool]] = {}
+        pulled_by = {entity.trailer: entity.name for entity in model.entities if entity.trailer is not None}
+        self._unit = {entity.name: _first_of(entity.name, pulled_by) for entity in model.entities}
 
     def steer(self, dt: float) -> Moves:
         """Say where everybody is sideways after the next step of `dt` seconds; before ``SE_StepDT(dt)``.
@@ -142,18 +138,29 @@ class EsminiTraffic:
         simulation can go on.
         """
         there = dict(self._objects())
-        for gone in self._base.keys() - there.keys():  # who is added again begins anew
-            for known in (self._base, self._rests, self._lane_of):
-                known.pop(gone, None)
-        seen = [(name, state) for name, state in there.items() if self._is_sound(name, state)]
-        moment = self._moment(seen, dt)
+        vehicles = self._ledger.vehicles
+        for gone in vehicles.keys() - there.keys():  # who is added again begins anew
+            del vehicles[gone]
+        seen = {name: state for name, state in there.items() if self._is_sound(name, state)}
+        moment, places = self._moment(seen, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
-        for row, (_, state) in enumerate(seen):
-            if moves.steered[row]:
-                t = state.t + self._direction(state) * float(moves.offset[row] - moment.offset[row])
-                self.player.SE_ReportObjectLateralPosition(state.id, t)
+        starts: dict[str, float] = {}
+        for row, (name, state) in enumerate(seen.items()):
+            known, place = vehicles[name], places[row]
+            known.steered, known.rate = bool(moves.steered[row]), float(moves.rate[row])
+            if known.steered:
+                offset = float(moves.offset[row])
+                t = place.centre + place.left * offset
+                self._tell(name, state, t)
+                if known.place is None:
+                    starts[name] = t - state.t
+                known.place = offset
+                self.undriven.pop(name, None)
+        for name, state in seen.items():  # where a vehicle begins, what it pulls begins behind it
+            first = self._unit.get(name, name)
+            if first != name and first in starts:
+                self._tell(name, state, state.t + starts[first])
         self.moves = moves.by_name(moment.names)
-        self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
         return moves
 
     def settle(self, dt: float) -> None:
@@ -164,46 +171,81 @@ class EsminiTraffic:
         """
         busy = self._busy()
         for name, state in self._objects():
-            offset, steered = self.moves.get(name, (0.0, False))
-            if name in busy and steered:  # begun in this step, in which the driver's place still counts
-                if abs(self.offset_of(state) - offset) > _SAME_PLACE:
+            if (known := self._ledger.vehicles.get(name)) is None:
+                continue
+            if name in busy and known.steered:  # begun in this step, in which the driver's place still counts
+                if known.told is None or self._ledger.apart(known.told, state) > _SAME_PLACE:
                     continue
                 bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * max(abs(state.speed), MINIMUM_SPEED)
-                over = max(SETTLING_TIME, 4.0 * abs(self._rates[name]) / bound)
-                self._rests[name] = _Rest(self._rates[name], over)
-            elif self._road(state) < 0 or (name not in busy and name not in self._touched):
-                self._rests.pop(name, None)
-            elif name in self._rests:  # once more when the action is over: from there on the driver leads over
-                rest = self._rests[name]
+                known.rest = Rest(known.rate, max(SETTLING_TIME, 4.0 * abs(known.rate) / bound))
+            elif self._ledger.road_of(state) < 0 or (name not in busy and name not in self._touched):
+                known.rest = None
+            elif (
+                known.rest is not None and abs(state.speed) > AT_REST
+            ):  # once more when the action is over: from there on the driver leads over
+                rest = known.rest
                 rest.passed += dt
                 rest.way = float(settle(np.array([rest.passed]), rest.over, rest.rate, 0.0)[0])
-                self.player.SE_ReportObjectLateralPosition(state.id, state.t + self._direction(state) * rest.way)
+                room = self._ledger.room_to_middle(state)
+                rest.way *= float(smooth_step(np.array([min(max(room / MIDDLE, 0.0), 1.0)]))[0])
+                if room > 0.0:
+                    left = self._ledger.left_of(state)
+                    self.player.SE_ReportObjectLateralPosition(state.id, state.t + left * rest.way)
 
-    def _busy(self) -> set[str]:
-        """Whom a lateral action moves now."""
-        return {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
+    # ---- a simulation that runs by itself (`loop`) -------------------------------------------------------------------
+    def time(self) -> float:
+        """Now. [s]"""
+        return float(self.player.SE_GetSimulationTime())
+
+    def is_over(self) -> bool:
+        """Whether the player wants to end."""
+        return bool(self.player.SE_GetQuitFlag() == 1)
+
+    def rows(self) -> Iterator[Row]:
+        """Where everybody is now."""
+        now = self.time()
+        for name, state in self._objects():
+            place = (state.road, state.lane, state.s, self.offset_of(state))
+            move = self.moves.get(name, (float("nan"), False))
+            yield now, name, state.x, state.y, state.h, state.speed, *place, *move, state.z, state.p, state.r
+
+    def drive(self, step: float) -> None:
+        """On by a step [s]; raises `SimulationError` if the player can't."""
+        self.steer(step)
+        if self.player.SE_StepDT(step) != 0:
+            raise SimulationError(f"{self.player.where} stopped at {self.time():g} s")
+        self.settle(step)
 
     def states(self) -> dict[str, ObjectState]:
         """Of all objects, by name."""
         return dict(self._objects())
 
     def offset_of(self, state: ObjectState) -> float:
-        """From the centre of its lane, positive LEFT of travel. [m]"""
-        return float(state.offset_t) * self._direction(state)
+        """From the centre of the lane that it is on, positive LEFT of travel. [m]"""
+        return float(state.offset_t) * self._ledger.left_of(state)
 
-    def _direction(self, state: ObjectState) -> float:
-        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1."""
-        road, network = self._road(state), self.network
-        if road < 0:
-            return 1.0
-        direction = float(network.travel_direction(road, state.lane))
-        if state.lane == 0 or not network.has_lane_at(road, state.lane, state.s):
-            return direction
-        ahead = network.pose_at(road, state.lane, state.s).heading + network.header_offset.heading
-        return direction if np.cos(state.h - ahead) >= 0.0 else -direction
+    # ---- what is told ------------------------------------------------------------------------------------------------
+    def _tell(self, name: str, state: ObjectState, t: float) -> None:
+        """Report a place [m], and the speed that there is; who stands is where he is."""
+        if abs(state.speed) <= AT_REST:
+            return
+        self.player.SE_ReportObjectSpeed(state.id, state.speed)
+        self.player.SE_ReportObjectLateralPosition(state.id, t)
+        offset_t = state.offset_t + t - state.t
+        self._ledger.vehicles[name].told = Told(self._ledger.road_of(state), state.lane, t, offset_t)
+
+    def _say(self, key: tuple[str, str], line: str) -> None:
+        """A warning, once for its key."""
+        if key not in self._said:
+            self._said.add(key)
+            self.warnings.append(line)
 
     # ---- what the simulation knows -----------------------------------------------------------------------------------
-    def _objects(self) -> Iterable[tuple[str, ObjectState]]:
+    def _busy(self) -> set[str]:
+        """Whom a lateral action moves now."""
+        return {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
+
+    def _objects(self) -> Iterator[tuple[str, ObjectState]]:
         for index in range(self.player.SE_GetNumberOfObjects()):
             number = self.player.SE_GetId(index)
             state = self.player.state(number)
@@ -213,76 +255,87 @@ class EsminiTraffic:
     def _is_sound(self, name: str, state: ObjectState) -> bool:
         """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
         if state.type != _VEHICLE_TYPE:
+            self.undriven.setdefault(name, "no vehicle")
             return False
         numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
         bad = [what for what, value in numbers.items() if not np.isfinite(value)]
-        if bad and (line := f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone") not in self.warnings:
-            self.warnings.append(line)
+        if bad:
+            self._say((name, bad[0]), f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone")
         return not bad
 
-    def _road(self, state: ObjectState) -> int:
-        return self._roads.get(str(state.road), -1)
+    def _why_not_ours(self, name: str, state: ObjectState) -> str:
+        """Why no driver of ours has a vehicle; empty: he may."""
+        if name in self._ego:
+            return "it is under test"
+        if state.category in _PULLED_CATEGORIES:
+            return "it is pulled"
+        if state.ctrl_type in EXTERNAL_CONTROLLERS:
+            self.waits.add(name)
+            return "its controller waits for another program"
+        return "a controller of its own steers it" if state.ctrl_type != 0 or name in self._steered else ""
 
-    def _moment(self, seen: list[tuple[str, ObjectState]], dt: float) -> Moment:
-        names = tuple(name for name, _ in seen)
+    def _moment(self, seen: dict[str, ObjectState], dt: float) -> tuple[Moment, list[Place]]:
+        names, now, busy = tuple(seen), float(self.player.SE_GetSimulationTime()), self._busy()
         column = {
-            what: np.array([getattr(state, what) for _, state in seen], dtype=np.float64)
-            for what in ("x", "y", "s", "speed", "offset_t", "length", "width", "center_x")
+            what: np.array([getattr(state, what) for state in seen.values()], dtype=np.float64)
+            for what in ("x", "y", "s", "speed", "length", "width", "center_x")
         }
-        road = np.array([self._road(state) for _, state in seen], dtype=np.int64)
-        lane = np.array([state.lane for _, state in seen], dtype=np.int64)
-        lanes = self._lanes(seen, road, self.traffic.is_due(self.player.SE_GetSimulationTime() + dt))
-        road = np.where([one.is_lane for one in lanes], road, -1)
-        offset = column["offset_t"] * [one.direction for one in lanes]
-        heading = np.array([one.heading for one in lanes])
-        is_lane = np.array([one.is_driving for one in lanes], dtype=np.bool_)
-        width = np.array([one.width for one in lanes])
-        pulled = np.array([state.category in _PULLED_CATEGORIES for _, state in seen], dtype=np.bool_)
-        others = self._ego | self._steered
-        ours = np.array([state.ctrl_type == 0 and name not in others for name, state in seen], dtype=np.bool_)
-        busy = self._busy()
-        in_maneuver = np.array([name in busy or name in self._touched for name in names], dtype=np.bool_)
-        for row, name in enumerate(names):
-            if in_maneuver[row] or name not in self._base:
-                self._base[name] = float(offset[row]) - (self._rests[name].way if name in self._rests else 0.0)
-            elif abs(moved := float(offset[row]) - self.moves.get(name, (float(offset[row]), False))[0]) > LANE_STEP:
-                self._base[name] += moved  # another lane is under it: it stays where it is
+        why = {name: self._why_not_ours(name, state) for name, state in seen.items()}
+        anew = self.traffic.is_due(now + dt)
+        places = [
+            self._ledger.place(
+                name, state, now, in_action=name in busy or name in self._touched, is_ours=not why[name], anew=anew
+            )
+            for name, state in seen.items()
+        ]
+        for name, place in zip(names, places, strict=True):
+            if not self._ledger.vehicles[name].steered and (why[name] or not place.is_free):
+                own = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
+                self.undriven[name] = why[name] or own
             if name not in busy:
-                self._rests.pop(name, None)
+                self._ledger.vehicles[name].rest = None
         self._touched.clear()
-        return Moment(
-            names, column["speed"], width, offset, is_lane & ~in_maneuver, ours & ~pulled,
-            np.array([state.category in _TRUCK_CATEGORIES for _, state in seen], dtype=np.bool_),
-            base=np.array([self._base[name] for name in names]),
-            places=Places(column["x"], column["y"], heading, road, lane, column["s"], column["length"],
-                          column["width"], column["center_x"]),
+        units = {first: k for k, first in enumerate(dict.fromkeys(self._unit.get(name, name) for name in names))}
+        given = {
+            what: np.array([getattr(place, what) for place in places], dtype=kind)
+            for what, kind in (("width", float), ("offset", float), ("base", float), ("heading", float),
+                               ("road", np.int64), ("lane", np.int64), ("is_free", np.bool_))
+        }  # fmt: skip
+        unit = np.array([units[self._unit.get(name, name)] for name in names], dtype=np.int64)
+        moment = Moment(
+            names, column["speed"], given["width"], given["offset"], given["is_free"],
+            np.array([not why[name] for name in names], dtype=np.bool_),
+            np.array([state.category in _TRUCK_CATEGORIES for state in seen.values()], dtype=np.bool_),
+            base=given["base"],
+            places=Places(column["x"], column["y"], given["heading"], given["road"], given["lane"], column["s"],
+                          column["length"], column["width"], column["center_x"], unit),
         )  # fmt: skip
-
-    def _lanes(self, seen: list[tuple[str, ObjectState]], road: IntArray, anew: bool) -> list[_Lane]:
-        """The lanes that vehicles are on; between steps of the model as they were, if they are the same."""
-        network, lanes = self.network, []
-        for (name, state), index in zip(seen, road.tolist(), strict=True):
-            known = self._lane_of.get(name)
-            if known is None or anew or known.place != (index, state.lane):
-                where = (index, state.lane, state.s)
-                known = _Lane(where[:2], False, False, 1.0, 1.0, state.h)
-                if index >= 0 and state.lane != 0 and network.has_lane_at(*where):
-                    width, heading = float(network.lane_width(*where)), network.pose_at(*where).heading
-                    is_driving = bool(network.lane_index(*where)[0] >= 0) and width > 0.0
-                    heading += network.header_offset.heading  # x and y are inertial
-                    known = _Lane(where[:2], True, is_driving, self._direction(state), max(width, 1e-3), heading)
-                self._lane_of[name] = known
-            lanes.append(known)
-        return lanes
+        return moment, places
 
     def _on_element(self, name: bytes, kind: int, state: int, path: bytes) -> None:
-        """Esmini's callback: a lateral action takes its vehicles, and gives them back."""
-        key = path.decode(errors="replace")
-        if kind == _ACTION_TYPE and key in self._moved_by:
-            self._running[key] = max(self._running[key] + (1 if state == _RUNNING_STATE else -1), 0)
-            self._touched |= self._moved_by[key]
+        """Esmini's callback."""
+        self._follow_action(name, kind, state, path)
         if self._also is not None:
             self._also(name, kind, state, path)
+
+    def _follow_action(self, _name: bytes, kind: int, state: int, path: bytes) -> None:
+        """A lateral action takes its vehicles, and gives them back."""
+        key = path.decode(errors="replace")
+        if kind == _ACTION_TYPE and key in self._moved_by:
+            begins, now = state == _RUNNING_STATE, self.time()
+            if begins:
+                self._begun[key] = now
+            elif self._running[key] and key in self._begun:
+                self.spans.setdefault(key, []).append((self._begun.pop(key), now))
+            self._running[key] = max(self._running[key] + (1 if begins else -1), 0)
+            self._touched |= self._moved_by[key]
+
+
+def _first_of(name: str, pulled_by: dict[str, str]) -> str:
+    """Who pulls it, and whoever pulls that one."""
+    for _ in range(len(pulled_by)):
+        name = pulled_by.get(name, name)
+    return name
 
 
 def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:

@@ -38,6 +38,7 @@ FUNCTIONS: dict[str, tuple[Any, ...]] = {
     "SE_GetObjectState": (c.c_int, c.c_int, c.c_void_p),
     "SE_GetODRFilename": (c.c_char_p,),
     "SE_ReportObjectLateralPosition": (c.c_int, c.c_int, c.c_double),
+    "SE_ReportObjectSpeed": (c.c_int, c.c_int, c.c_double),
     "SE_RegisterStoryBoardElementStateChangeCallback": (None, StoryboardCallback),
 }
 """What is called: type of the answer, types of the arguments."""
@@ -64,10 +65,17 @@ class Player:
             typed = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
             setattr(self, name, typed or getattr(library, name))
         self._is_known = False
+        self.heard: list[tuple[bytes, int, int, bytes]] = []
+        """Changes of storyboard elements while `open_player` opened a scenario."""
 
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Callable[..., Any]: ...
+
+    def listen(self) -> None:
+        """Note in `heard` what changes from now on: actions that begin at 0 s do so while a scenario is opened."""
+        self._hears = StoryboardCallback(lambda *element: self.heard.append(element))
+        self.SE_RegisterStoryBoardElementStateChangeCallback(self._hears)
 
     def state(self, number: int) -> ObjectState | None:
         """Of an object; None if there is none. Raises `SimulationError`: the library has another structure."""
@@ -107,6 +115,7 @@ def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> 
         player.SE_SetLogFilePath(b"")
     if hasattr(player, "SE_LogToConsole"):
         player.SE_LogToConsole(False)
+    player.listen()
     if player.SE_Init(str(scenario).encode(), 0, int(window), 0, 0) != 0:
         raise SimulationError(f"{scenario}: {player.where} can't open it")
     return player

@@ -10,18 +10,21 @@ import subprocess
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import numpy as np
+
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.limits import DISTANCES
+from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.workflows.live.c_driver import c_sources, filled, identifier
-from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.python_fmu import ABSENT_DISTANCE, Variable, add_units, export_python_fmu, variables_of
+from xosc_lateral.workflows.live.c_numbers import inputs_of, usual
 
 HOST_COMPILERS = ("cc", "gcc", "clang")
 """What is looked for where no compiler is named; the first that is there."""
@@ -34,18 +37,14 @@ NAMES_OF_STATE = {"2": ("FMUstate", "DeSerializeFMUstate"), "3": ("FMUState", "D
 
 
 def export_fmu(
-    profile: DriverProfile, path: str | Path, *, fmi: str = "2.0", python: bool = False, compilers: Sequence[str] = ()
+    profile: DriverProfile, path: str | Path, *, fmi: str = "2.0", compilers: Sequence[str] = ()
 ) -> tuple[str, ...]:
     """Write a unit (``.fmu``, which is replaced) of FMI ``2.0`` or ``3.0``; the platforms that it has binaries for.
 
     It holds C source, and what the C99 `compilers` make of it, cross compilers too; without, the host's where there is
-    one. A `python` unit calls this package, which the simulating process has to have beside its Python (extra `fmu`).
-    Raises `SimulationError`: a compiler is not there or fails, or the extra `fmu` is missing; `DriverProfileError`: the
-    profile has an effect or a core model of a plug-in.
+    one. Raises `SimulationError`: a compiler is not there or fails; `DriverProfileError`: the profile has an effect or
+    a core model of a plug-in.
     """
-    if python:
-        export_python_fmu(profile, path, fmi=fmi)
-        return ()
     version, name = fmi[0], identifier(profile)
     sources = _sources(profile, version)
     members = {f"sources/{file}": text.encode() for file, text in sources.items()}
@@ -137,7 +136,9 @@ def _description(profile: DriverProfile, version: str, token: str) -> Element:
         _list_sources(SubElement(simulation, "SourceFiles"), "File", name)
     listed = variables_of(profile)
     add_units(root, {variable.unit for variable in listed if variable.unit is not None})
-    SubElement(SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    logged = SubElement(root, "LogCategories")
+    for category in ("logStatusWarning", "logStatusError"):
+        SubElement(logged, "Category", name=category)
     SubElement(root, "DefaultExperiment", startTime="0", stepSize="0.01")
     variables, structure = SubElement(root, "ModelVariables"), SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
@@ -195,3 +196,80 @@ def _packed(members: Mapping[str, bytes]) -> bytes:
         for name in sorted(members):
             archive.writestr(zipfile.ZipInfo(name), members[name], zipfile.ZIP_DEFLATED)
     return packed.getvalue()
+
+
+# ---- variables and units ---------------------------------------------------------------------------------------------
+ABSENT_DISTANCE = 1000.0
+"""Distances from here on mean that nobody is there: files of FMI have no infinity that every tool reads. [m]"""
+
+BASE_UNITS: dict[str, dict[str, float]] = {
+    "m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "m/s2": {"m": 1, "s": -2}, "1/m": {"m": -1}, "rad": {"rad": 1},
+    "%": {"factor": 0.01}, "h": {"s": 1, "factor": 3600.0}, "mm/h": {"m": 1, "s": -1, "factor": 1e-3 / 3600.0},
+    "deg": {"rad": 1, "factor": float(np.pi / 180.0)}, "lx": {"cd": 1, "m": -2}, "-": {},
+}  # fmt: skip
+"""Units of inputs and outputs in base units."""
+
+DESCRIPTIONS_OF_VARIABLES = {
+    "offset": "From the lane's centre, positive left", "rate": "Change of the offset per time",
+    "heading": "Relative to the lane, positive left", "position": "Where the vehicle is while it does not follow",
+    "following": "It follows the road; while not, `position` is where it is.",
+    "seed": "Same seed, same driver: as of `sample`.",
+    "fault": "Number of the effect that wanted what can't be driven; 0: none",
+    "lane_index": "0: rightmost", "curvature": "Positive: to the left",
+    **{
+        f"{side}_distance": f"Free space; {ABSENT_DISTANCE:g} or more: nobody"
+        for side in ("lead", "left", "right", "oncoming")
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable; those with a unit are real numbers."""
+
+    name: str
+    causality: str
+    start: float | bool | None
+    unit: str | None = None
+
+    @property
+    def kind(self) -> int:
+        """0: real, 1: truth value, 2: whole number."""
+        return 0 if self.unit is not None else 1 if isinstance(self.start, bool) else 2
+
+    @property
+    def variability(self) -> str:
+        """In the words of FMI."""
+        return "fixed" if self.causality == "parameter" else "discrete" if self.kind else "continuous"
+
+    @property
+    def words(self) -> str:
+        """For the description."""
+        return DESCRIPTIONS_OF_VARIABLES.get(self.name, self.name)
+
+
+def variables_of(profile: DriverProfile) -> list[Variable]:
+    """In the order of their value references: inputs, outputs, seed, fault."""
+    inputs = [
+        Variable(name, "input", min(usual(profile, name), ABSENT_DISTANCE), CONTEXT_UNITS.get(name, "-"))
+        for name in inputs_of(profile)
+    ]
+    outputs = [
+        Variable(name, "output", None, unit) for name, unit in (("offset", "m"), ("rate", "m/s"), ("heading", "rad"))
+    ]
+    position = Variable("position", "input", 0.0, "m")
+    following, seed, fault = (
+        Variable("following", "input", True),
+        Variable("seed", "parameter", 0),
+        Variable("fault", "output", None),
+    )
+    return [*inputs, position, following, *outputs, seed, fault]
+
+
+def add_units(root: Element, names: set[str]) -> Element:
+    """Definitions of units as both versions of FMI have them."""
+    definitions = SubElement(root, "UnitDefinitions")
+    for name in sorted(names):
+        unit = SubElement(definitions, "Unit", name=name)
+        SubElement(unit, "BaseUnit", {key: f"{value:.16g}" for key, value in BASE_UNITS[name].items()})
+    return definitions

@@ -39,14 +39,14 @@ NEGLIGIBLE_REST = 1e-12
 DRIVER = np.dtype(
     [("curve", float, 6), ("begun", bool), ("following", bool), ("place", float), ("own", float),
      ("rest", float), ("from", float), ("from_rate", float), ("share", float), ("over", float), ("slip", float),
-     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED), ("width", float)]
+     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED)]
 )  # fmt: skip
 """A driver beside his random numbers.
 
 His curve until the next model step and whether it has begun; whether the vehicle followed the road a step ago, where it
 was, and the driver's own offset there [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate`
 [m/s], done to `share` [-] of `over` [s], plus what slow driving left out (`slip` [m]); how far he has moved aside, how
-fast, and how far he wants to; speeds of the last second; width of the lane as he has it [m].
+fast, and how far he wants to; speeds of the last second.
 """
 
 
@@ -92,8 +92,10 @@ def drive_on(
     was_rate = np.where(passed > 0.0, (offset - state["place"]) / max(passed, 1e-9), 0.0)
     _move_aside(state, passed * pace)
     aside, aside_rate = state["aside"], state["aside_rate"] * pace
-    if is_first:
+    if is_first:  # who drives, began so; who is slow or stands stays where it is, and is led over as it drives off
         state["rest"][taken_over] = 0.0
+        slow = taken_over & (pace < 1.0)
+        _lead_over(state, slow, offset - base - driver - aside, np.zeros(len(state)), speed)
     elif taken_over.any():
         was_rate = np.where(np.abs(was_rate) < np.maximum(0.2 * np.abs(speed), 0.1), was_rate, 0.0)  # placed anew
         was_rate = np.where(state["place"] == 0.0, 0.0, was_rate)

@@ -88,7 +88,11 @@ class Pipe:
         moves = self.traffic.step(_number(message, "time", "the line"), self._moment(vehicles, columns))
         self._columns = columns
         rows = zip(*(column.tolist() for column in moves), strict=True)
-        answers = {name: dict(zip(Moves._fields, row, strict=True)) for name, row in zip(vehicles, rows, strict=True)}
+        answers: dict[str, dict[str, Any]] = {
+            name: dict(zip(Moves._fields, row, strict=True)) for name, row in zip(vehicles, rows, strict=True)
+        }
+        for name in self.traffic.faults.keys() & answers.keys():
+            answers[name]["fault"] = self.traffic.faults[name]
         return {"time": message["time"], "vehicles": answers}
 
     def _moment(self, vehicles: Mapping[str, Mapping[str, Any]], columns: set[str]) -> Moment:
@@ -138,8 +142,8 @@ class Pipe:
             poses = self.network.lane_to_world(road[on], lane[on], s[on], offset[on])
             centre = self.network.lane_to_world(road[on], lane[on], s[on])
             pose[:, on] = poses.x, poses.y, centre.heading
-        size = (_numbers(seen, key, usual) for key, usual in USUAL_SIZE.items())
-        return Places(pose[0], pose[1], pose[2], road, lane, s, *size)
+        length, width, center_x = (_numbers(seen, key, usual) for key, usual in USUAL_SIZE.items())
+        return Places(pose[0], pose[1], pose[2], road, lane, s, length, width, center_x)
 
 
 _Seen = list[tuple[str, Mapping[str, Any]]]

@@ -10,7 +10,7 @@ only.)
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,9 +23,11 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.sumo import is_left_handed
 from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.workflows.live.loop import Row
 from xosc_lateral.workflows.live.paths import Moves
-from xosc_lateral.workflows.live.scene import CATEGORY_OF_CLASS
+from xosc_lateral.workflows.live.scene import CATEGORY_OF_CLASS, sumo_entity
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
 from xosc_lateral.world.surroundings.moment import Places
@@ -210,6 +212,9 @@ class SumoTraffic:
         )  # fmt: skip
         self._known: dict[str, _Vehicle] = {}
         self.moves: dict[str, tuple[float, bool]] = {}
+        self.entities: dict[str, Entity] = {}
+        """All that `rows` has seen."""
+        self.counts = Counter({"collisions": 0, "teleports": 0})
         self.warnings: list[str] = []
         if sublane < (widest := max(self.roads.width.values(), default=0.0)):
             self.warnings.append(
@@ -234,6 +239,33 @@ class SumoTraffic:
                 vehicles.changeSublane(name, 0.0)
         self.moves = moves.by_name(moment.names)
         return moves
+
+    # ---- a simulation that runs by itself (`loop`) -------------------------------------------------------------------
+    def time(self) -> float:
+        """Now. [s]"""
+        return float(self.connection.simulation.getTime())
+
+    def is_over(self) -> bool:
+        """Whether nobody is there, or will be."""
+        return bool(self.connection.simulation.getMinExpectedNumber() <= 0)
+
+    def rows(self) -> Iterator[Row]:
+        """Where everybody is now."""
+        now, vehicles = self.time(), self.connection.vehicle
+        for name, x, y, h, speed, lane, s, offset in self.states():
+            if name not in self.entities:
+                self.entities[name] = sumo_entity(vehicles, name)
+            edge, _, index = lane.rpartition("_")
+            move = self.moves.get(name, (float("nan"), False))
+            z = float(vehicles.getPosition3D(name)[2])
+            yield now, name, x, y, h, speed, edge, int(index), s, offset, *move, z, 0.0, 0.0
+
+    def drive(self, step: float) -> None:
+        """On by SUMO's step, which is `step` [s]."""
+        self.steer()
+        self.connection.simulationStep()
+        self.counts["collisions"] += len(self.connection.simulation.getCollisions())
+        self.counts["teleports"] += self.connection.simulation.getStartingTeleportNumber()
 
     def states(self) -> Iterable[tuple[str, float, float, float, float, str, float, float]]:
         """Of everybody on a lane: name, x, y [m], heading [rad], speed [m/s], lane, s and offset [m]."""

@@ -19,6 +19,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import SimulationError, XoscLateralError
 from xosc_lateral.base.limits import LIVE_PAUSE, LIVE_RANGES, TIME
+from xosc_lateral.drivers.model.actuator import fault_in_words
 from xosc_lateral.drivers.model.group import OffsetGroup
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
 from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_hash
@@ -26,7 +27,6 @@ from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
 from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS_REMEMBERED, Moves, drive_on
-from xosc_lateral.world.surroundings.context import STEERING_DURATION
 from xosc_lateral.world.surroundings.give_way import Response, give_way_now
 from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
 
@@ -87,6 +87,13 @@ class Traffic:
         self._time: float | None = None
         self._knots = 0
         self._columns: tuple[str, ...] | None = None
+        self.faults: dict[str, str] = {}
+        """Vehicles whose drivers wanted what can't be driven and are held back (`actuator`), and what wanted it."""
+
+    def fault_lines(self) -> list[str]:
+        """The same, a line each."""
+        return [f"vehicle {name!r}: {what} wanted what can't be driven; it is held back"
+                for name, what in self.faults.items()]  # fmt: skip
 
     def __len__(self) -> int:
         return len(self._names)
@@ -196,9 +203,9 @@ class Traffic:
             other_hand = profile.left_hand != self._left_hand
             seen = mirrored_context(context) if other_hand else context
             for _ in range(due):
-                curve = group.advance(
-                    {name: seen[name][rows] for name in self._columns}, self._width(drivers, width[rows])
-                )
+                curve = group.advance({name: seen[name][rows] for name in self._columns}, width[rows])
+            for k in np.flatnonzero(group.actuator.state["fault"]).tolist():
+                self.faults[members[k]] = fault_in_words(profile, int(group.actuator.state["fault"][k]))
             self._state["curve"][drivers] = -curve if other_hand else curve
         state = self._state
         is_new = ~state["begun"][all_drivers]
@@ -206,12 +213,6 @@ class Traffic:
         state["begun"][all_drivers] = True
         state["speeds"][all_drivers] = np.column_stack([state["speeds"][all_drivers, 1:], moment.speed[there]])
         state["wanted"][all_drivers] = wanted[there]
-
-    def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
-        """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
-        before = np.where(self._state["width"][drivers] > 0.0, self._state["width"][drivers], width)
-        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING_DURATION)
-        return np.asarray(self._state["width"][drivers])
 
     def _aside(self, moment: Moment, there: IntArray, drivers: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
@@ -298,7 +299,7 @@ class Traffic:
         rows = state["drivers"].values()
         tuples = [tuple(tuple(value) if isinstance(value, list) else value for value in row) for row in rows]
         self._state = np.array(tuples, dtype=DRIVER)
-        self._groups = {}
+        self._groups, self.faults = {}, {}
         for key, saved in state["groups"].items():
             group = OffsetGroup(self._profiles[key], self._columns or ())
             group.restore(saved, [self.seed_of(name) for name in saved["members"]])

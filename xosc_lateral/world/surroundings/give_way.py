@@ -145,6 +145,8 @@ def give_way_now(
     cos, sin = np.cos(places.heading), np.sin(places.heading)
     x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
     a, b = pairs_now(x, y, FADE_DISTANCE + float(places.length.max(initial=0.0)) + REACH_MARGIN)
+    apart = places.apart(a, b)
+    a, b = a[apart], b[apart]
     vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
     vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
     x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts

@@ -87,6 +87,14 @@ class Places:
     width: FloatArray
     center_x: FloatArray
     """Of the bounding box, and how far its middle is ahead of the reference point. [m]"""
+    unit: IntArray | None = None
+    """The same for a vehicle and what it pulls: they don't see each other."""
+
+    def apart(self, one: IntArray, other: IntArray) -> BoolArray:
+        """Pairs that are no vehicle and its own trailer."""
+        if self.unit is None:
+            return np.ones(len(one), dtype=np.bool_)
+        return np.asarray(self.unit[one] != self.unit[other])
 
 
 def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:
@@ -125,6 +133,8 @@ def _along_paths(
         group[k], start, path = origins[key]
         u[k] = path[0].sign * (s - start)
     a, b = around.pairs_now(np.where(group >= 0, places.x, np.nan), places.y, around.IN_SIGHT)
+    apart = places.apart(a, b)
+    a, b = a[apart], b[apart]
     vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
     order = np.argsort(group[vehicle], kind="stable")
     vehicle, other = vehicle[order], other[order]

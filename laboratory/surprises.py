@@ -1,0 +1,107 @@
+"""What a driver does where context changes suddenly: each column of each shipped profile stepped, in Python and in C.
+
+    python -m laboratory.surprises [--seeds 100] [--speed 33] [--no-c]
+
+For 30 s the context stays, at 15 s one column steps. Per column, over all profiles, steps and seeds: the largest
+lateral speed and, at 20 Hz, acceleration from then on; in the first line nothing steps. The same drivers in Python
+(`Traffic`) and in C (`export c`), and how far they are apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import xosc_lateral as xl
+from tests.kit.compiled import CompiledDriver
+from xosc_lateral.drivers.model.seeds import child
+from xosc_lateral.workflows.live.c_numbers import inputs_of
+from xosc_lateral.workflows.live.traffic import Moment, Traffic
+
+STEP, SECONDS, AT = 0.05, 30.0, 15.0
+USUAL = {"lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}
+STEPS: dict[str, tuple[float, ...]] = {
+    "lane_index": (0.0, 2.0), "lane_width": (2.75, 4.25), "is_truck": (1.0,), "speed": (16.5, 45.0),
+    "left_distance": (3.0, np.nan), "right_distance": (3.0, np.nan),
+}  # fmt: skip
+"""What a column steps to."""
+
+
+class Numbered(Traffic):
+    """Vehicles whose names are seeds; their drivers are those that `sample` gives for them."""
+
+    def seed_of(self, name: str) -> np.random.SeedSequence:
+        return child(np.random.SeedSequence(int(name)), 0)
+
+
+def usual(column: str, speed: float) -> float:
+    """Value of a column before it steps."""
+    return speed if column == "speed" else USUAL.get(column, np.inf if column.endswith("_distance") else 0.0)
+
+
+def offsets(profile: xl.DriverProfile, seeds: int, column: str, to: float, speed: float) -> np.ndarray:
+    """Of all drivers in Python at every step, shape (n, seeds). [m]"""
+    traffic, names = Numbered(profile), tuple(map(str, range(1, seeds + 1)))
+    offset, yes, rows = np.zeros(seeds), np.ones(seeds, dtype=bool), []
+    for k in range(round(SECONDS / STEP) + 1):
+        stepped = {column: to} if k * STEP >= AT else {}
+        values = {name: stepped.get(name, usual(name, speed)) for name in inputs_of(profile)}
+        context = {name: np.full(seeds, value) for name, value in values.items()}
+        others = {name: own for name, own in context.items() if name not in ("speed", "lane_width", "is_truck")}
+        truck = yes if values.get("is_truck") else ~yes
+        moment = Moment(names, context["speed"], context["lane_width"], offset, yes, yes, truck, context=others)
+        offset = traffic.step(k * STEP, moment).offset
+        rows.append(offset)
+    return np.array(rows)
+
+
+def compiled(driver: CompiledDriver, seeds: int, column: str, to: float, speed: float) -> np.ndarray:
+    """The same in C."""
+    rows = []
+    for seed in range(1, seeds + 1):
+        driver.start(seed)
+        values = {name: usual(name, speed) for name in driver.columns}
+        stepped = values | ({column: to} if column else {})
+        steps = range(round(SECONDS / STEP) + 1)
+        rows.append([driver.step(k * STEP, stepped if k * STEP >= AT else values)[0] for k in steps])
+    return np.array(rows).T
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--speed", type=float, default=33.0)
+    parser.add_argument(
+        "--profiles", nargs="*", default=["motorway", "motorway-refined", "motorway-vehicle-3", "rural"]
+    )
+    parser.add_argument("--no-c", action="store_true")
+    given = parser.parse_args()
+    worst: dict[str, list[float]] = {}
+    for name in given.profiles:
+        profile = xl.read_profile(name)
+        with tempfile.TemporaryDirectory() as folder:
+            driver = None if given.no_c else CompiledDriver(profile, Path(folder))
+            known = inputs_of(profile)
+            cases = [("", 0.0), *((column, to) for column, values in STEPS.items() if column in known for to in values)]
+            for column, to in cases:
+                moved = offsets(profile, given.seeds, column, to, given.speed)
+                apart = 0.0
+                if driver is not None:
+                    own = compiled(driver, given.seeds, column, to, given.speed)
+                    apart = float(np.abs(own - moved).max())
+                later = moved[round(AT / STEP) :]
+                found = [np.abs(np.diff(later, axis=0)).max() / STEP, np.abs(np.diff(later, 2, axis=0)).max() / STEP**2]
+                row = worst.setdefault(column or "nothing", [0.0, 0.0, 0.0])
+                worst[column or "nothing"] = [max(pair) for pair in zip(row, [*map(float, found), apart], strict=True)]
+    print(f"| stepped, at {given.speed:g} m/s | lateral speed [m/s] | acceleration [m/s2] | Python and C apart [m] |")
+    print("|---|---|---|---|")
+    for column, (speed, acceleration, apart) in worst.items():
+        print(f"| {column} | {speed:.2f} | {acceleration:.2f} | {'' if given.no_c else f'{apart:.0e}'} |")
+
+
+if __name__ == "__main__":
+    main()

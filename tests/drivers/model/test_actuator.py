@@ -1,0 +1,125 @@
+"""What a driver does to a vehicle at most, whatever suddenly changes or a profile's numbers come to."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.kit.compiled import CompiledDriver
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.drivers.model.actuator import drivable_step, fault_in_words, pay_off, stopping_speed
+from xosc_lateral.drivers.model.effects import Step
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.seeds import child
+from xosc_lateral.files.profiles import read_profile, write_profile
+from xosc_lateral.workflows.live.c_numbers import inputs_of
+from xosc_lateral.workflows.live.traffic import Moment, Traffic
+
+STEP = 0.05
+USUAL = {"speed": 33.0, "lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}
+SEEDS = 30
+
+
+class Numbered(Traffic):
+    """Names are seeds of `sample`."""
+
+    def seed_of(self, name: str) -> np.random.SeedSequence:
+        return child(np.random.SeedSequence(int(name)), 0)
+
+
+def driven(profile: DriverProfile, seconds: float, at: float, **stepped: float) -> tuple[np.ndarray, Traffic]:
+    """Offsets of `SEEDS` drivers, shape (n, SEEDS) [m], some of whose columns step at a time [s]."""
+    traffic, names = Numbered(profile), tuple(map(str, range(1, SEEDS + 1)))
+    yes, offset, rows = np.ones(SEEDS, dtype=bool), np.zeros(SEEDS), []
+    for k in range(round(seconds / STEP) + 1):
+        values = {name: USUAL.get(name, np.inf) for name in inputs_of(profile)} | (stepped if k * STEP >= at else {})
+        context = {name: np.full(SEEDS, value) for name, value in values.items()}
+        others = {name: own for name, own in context.items() if name not in ("speed", "lane_width", "is_truck")}
+        truck = yes if values.get("is_truck") else ~yes
+        moment = Moment(names, context["speed"], context["lane_width"], offset, yes, yes, truck, context=others)
+        offset = traffic.step(k * STEP, moment).offset
+        rows.append(offset)
+    return np.array(rows), traffic
+
+
+STEPPED: list[dict[str, float]] = [
+    {}, {"lane_index": 0.0}, {"lane_width": 2.75}, {"is_truck": 1.0}, {"right_distance": 3.0}, {"left_distance": 3.0},
+    {"right_distance": float("nan")}, {"lane_index": 2.0, "lane_width": 4.25, "left_distance": 5.0},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["motorway", "motorway-refined"])
+def test_a_column_that_steps_throws_nobody_and_is_responded_to_in_the_end(name: str) -> None:
+    profile = read_profile(name)
+    still = driven(profile, 25.0, 12.0)[0]
+    for stepped in STEPPED:
+        moved = driven(profile, 25.0, 12.0, **stepped)[0]
+        assert np.abs(np.diff(moved, 2, axis=0)).max() / STEP**2 < 1.0, stepped
+        np.testing.assert_array_equal(moved[:240], still[:240])
+        if "right_distance" in stepped and np.isfinite(stepped["right_distance"]):
+            assert np.mean(moved[-1] - still[-1]) > 0.05  # to the left, of who comes on the right
+
+
+def test_what_is_slow_and_soft_passes_at_once_and_the_rest_is_paid_off_to_centimetres() -> None:
+    owed, pace = pay_off(np.array([0.003]), np.zeros(1), 0.2)
+    assert owed[0] == 0.0 and pace[0] == pytest.approx(0.015)
+    owed, pace, way = np.array([0.8, -0.8]), np.zeros(2), []
+    for _ in range(60):
+        before = pace
+        owed, pace = pay_off(owed, pace, 0.2)
+        assert (np.abs(pace) <= 0.2 + 1e-12).all() and (np.abs(pace - before) <= 0.1 * 0.2 + 1e-12).all()
+        way.append(owed)
+    assert (np.array(way)[:, 0] > -0.015).all() and owed.tolist() == [0.0, 0.0]
+    assert np.flatnonzero(np.abs(np.array(way)[:, 0]) < 0.015)[0] * 0.2 < 8.0
+
+
+def test_one_stops_in_time_at_the_border_of_what_is_allowed() -> None:
+    offsets = [np.zeros(1), np.zeros(1)]
+    for _ in range(60):
+        offsets.append(drivable_step(np.array([50.0]), offsets[-1], offsets[-2], np.array([5.25]), 0.2))
+    path = np.ravel(offsets)
+    assert 5.2 < path.max() <= 5.25
+    assert np.abs(np.diff(path, 2)).max() / 0.2**2 <= 3.0 + 1e-9
+    assert stopping_speed(np.zeros(1), 3.0, 0.2)[0] == 0.0
+
+
+def planted(profile: DriverProfile, coefficient: float) -> DriverProfile:
+    values = copy.deepcopy(profile.to_dict())
+    values["effects"][1]["coefficients"] = [coefficient]
+    return DriverProfile.from_dict(values)
+
+
+@pytest.mark.parametrize("coefficient", [50.0, -50.0, 1e300])
+def test_an_effect_that_wants_what_cannot_be_driven_is_left_out_and_named(coefficient: float, tmp_path: Path) -> None:
+    profile = planted(read_profile("motorway-refined"), coefficient)
+    moved, traffic = driven(profile, 20.0, 8.0, lane_index=2.0)
+    assert np.abs(moved).max() < 1.5
+    assert set(traffic.faults.values()) == {"effect 2, levels of lane_index"}
+    driver = CompiledDriver(profile, tmp_path)
+    driver.start(1)
+    values = {name: USUAL.get(name, np.inf) for name in driver.columns}
+    own = [driver.step(k * STEP, values | ({"lane_index": 2.0} if k * STEP >= 8.0 else {}))[0] for k in range(401)]
+    np.testing.assert_allclose(own, moved[:, 0], rtol=0.0, atol=1e-9)
+    number, words = driver.fault()
+    assert number == 2 and words.startswith("effect 2, levels of lane_index wanted")
+
+
+def test_movement_that_cannot_be_driven_stays_near_the_lane_and_is_named() -> None:
+    profile = read_profile("motorway-refined").with_effects(Step(size=40.0, at_s=5.0))
+    moved, traffic = driven(profile, 40.0, 50.0)
+    assert np.abs(moved).max() <= 1.5 * 3.5 + 1e-9
+    assert np.abs(moved[700:]).max() < 0.1  # back to the lane's centre
+    assert set(traffic.faults.values()) == {fault_in_words(profile, len(profile.effects) + 1)}
+
+
+def test_a_profile_is_tried_over_its_columns_where_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "p.json"
+    write_profile(planted(read_profile("motorway-refined"), 50.0), path)
+    with pytest.raises(
+        FormatError, match=r"effect 2 \(levels of lane_index\): an offset of 36\.\d+ m; lane widths"
+    ) as e:
+        read_profile(path)
+    assert "\n" not in str(e.value)
