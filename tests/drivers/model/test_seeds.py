@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import zlib
+
 import numpy as np
 
-from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed, child, generator
+from xosc_lateral.drivers.model.seeds import (
+    AutoregressiveSeed,
+    DriveSeed,
+    TwoLevelSeed,
+    child,
+    generator,
+    of_driver,
+    of_name,
+)
 
 
 def test_the_children_are_those_that_numpy_spawns() -> None:
@@ -53,3 +63,11 @@ def test_keys_are_what_older_profiles_were_sampled_with() -> None:
     ]
     assert [seed.value for seed in TwoLevelSeed] == [0, 1, 2]
     assert [seed.value for seed in AutoregressiveSeed] == [0, 1, 2, 3]
+
+
+def test_names_that_share_a_checksum_of_32_bits_are_two_drivers() -> None:
+    assert zlib.crc32(b"plumless") == zlib.crc32(b"buckeroo")
+    one, other = (of_driver(1, name).generate_state(4).tolist() for name in ("plumless", "buckeroo"))
+    assert one != other
+    assert of_name("Car 1").bit_length() > 100
+    assert of_driver(1, "a", variant=2).generate_state(4).tolist() != of_driver(1, "a").generate_state(4).tolist()

@@ -5,7 +5,9 @@ Keys are part of what a seed means: changing one changes the numbers that a prof
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import IntEnum
+from hashlib import sha256
 
 import numpy as np
 
@@ -38,6 +40,18 @@ class AutoregressiveSeed(IntEnum):
     """Below it: 0 for what varies within seconds, 1 for what varies within minutes."""
     COARSE = 2
     FINE = 3
+
+
+def of_name(name: str) -> int:
+    """128 bits of a name: among a billion of them, no two have the same by chance (less than one in 10^20)."""
+    return int.from_bytes(sha256(name.encode()).digest()[:16], "big")
+
+
+def of_driver(
+    seed: int, name: str, *, variant: int = 0, attempt: int = 0, words: Iterable[int] = ()
+) -> np.random.SeedSequence:
+    """The driver of a vehicle of that name, in a conversion as live: same seed, same name, same driver."""
+    return np.random.SeedSequence([seed, variant, attempt, of_name(name), *words])
 
 
 def child(seed: np.random.SeedSequence, *keys: int) -> np.random.SeedSequence:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
+from xosc_lateral.drivers.model.seeds import of_driver
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.result import (
     Drivers,
@@ -84,9 +84,7 @@ def enrich(
         driver, spans = drivers.get(entity.name, "not chosen"), run.spans[index]
         if isinstance(driver, str):
             return _Drawn(entity, spans, why=driver)
-        seeds = np.random.SeedSequence(
-            [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
-        )
+        seeds = of_driver(seed, entity.name, variant=variant, attempt=attempt, words=words.get(entity.name, ()))
         seen, lifelike = run.seen(index, driver, context or {}), lane_changes is LaneChanges.LIFELIKE
         blank = _Drawn(entity, spans, driver, seen, run.crossings[index], lifelike)
         return _draw(blank, driver, seeds, with_sensor, least_rows)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from zlib import crc32
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.drivers.model.seeds import of_name
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, Truth, truth_of
 
 RATE_WINDOW = 0.5
@@ -145,7 +145,7 @@ class View:
 
 def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = True) -> list[View]:
     """Every vehicle but the ego, from both sides where it is ever watched from there."""
-    root = (seed, crc32(scene.name.encode()))
+    root = (seed, of_name(scene.name))
     several = len({track.name for track in scene.tracks}) > 1
     views = []
     for number, track in enumerate(scene.tracks):

@@ -7,7 +7,6 @@ A driver goes on at the model's step (5 Hz), on what he sees at that moment; in 
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
@@ -23,6 +22,7 @@ from xosc_lateral.drivers.model.actuator import fault_in_words
 from xosc_lateral.drivers.model.group import OffsetGroup
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
 from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_hash
+from xosc_lateral.drivers.model.seeds import of_driver
 from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
@@ -143,7 +143,7 @@ class Traffic:
 
     def seed_of(self, name: str) -> np.random.SeedSequence:
         """The random numbers of a vehicle's driver: those of a conversion with this seed."""
-        return np.random.SeedSequence([self.seed, 0, 0, zlib.crc32(name.encode())])
+        return of_driver(self.seed, name)
 
     def _profile_key(self, name: str) -> str:
         return name if name in self._profiles else ""
