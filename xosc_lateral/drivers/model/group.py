@@ -281,7 +281,8 @@ class OffsetGroup:
         """Draw what comes after all that is drawn; a `ValueError` if a state from outside leads to no offsets."""
         for k, driver in enumerate(self._state):
             next_ = (0.0, driver["drawn"]) if self._rated else self._block(k)
-            for values in (driver["mean"], self.actuator.state["samples"][k], driver["drawn"], *next_):
+            asked = (self.actuator.state[name][k] for name in ("samples", "heeded", "owed", "pace"))
+            for values in (driver["mean"], *asked, driver["drawn"], *next_):
                 if not np.abs(values).max() <= LIVE_RANGES["offset"].high:
                     raise ValueError(f"drives[{k}]: a number that no driver has")
 

@@ -54,7 +54,7 @@ _VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 EXTERNAL_CONTROLLERS = (1, 11)
 """Controllers that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
-MIDDLE = 0.5
+MIDDLE = 1.5
 """So near to the middle of the road, what is left of a lateral speed fades: a place reported beyond it is one of the
 oncoming lane, where a lane change across goes astray. [m]"""
 
