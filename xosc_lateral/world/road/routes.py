@@ -36,15 +36,19 @@ class Routes(Links):
         if road == target:
             best = RoadPath((target_s - s) * direction, 1 if target_s >= s else -1, ())
         for way in (1, -1):
+            room = self.roads[road].length - s if way > 0 else s
+            reach = min(limit, abs(best.ds) if best is not None else inf)
+            if room > reach:
+                continue
             found = _shortest(
                 self.next_roads(road, way),
-                self.roads[road].length - s if way > 0 else s,
+                room,
                 lambda end: self.next_roads(*end),
                 lambda end: self.roads[end[0]].length,
                 lambda end: (
                     None if end[0] != target else target_s if end[1] > 0 else self.roads[target].length - target_s
                 ),
-                min(limit, abs(best.ds) if best is not None else inf),
+                reach,
             )
             if found is not None and (best is None or found[0] < abs(best.ds)):
                 best = RoadPath(found[0] * way * direction, way, found[1])
