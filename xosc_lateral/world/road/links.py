@@ -71,9 +71,9 @@ class Links:
             for target in _lanes_beyond(here, lane_here, way, s, joint, _named_by(lane_here, way), unsaid):
                 yield LaneLink(road, target, s, way)
             return
-        found = False
+        is_listed = False
         for other, contact, pairs, is_back in self._joints(road, way) if lane else ():
-            if is_back and found:
+            if is_back and is_listed:
                 return
             named = _named_by(lane_here, way) if pairs is None else [to for source, to in pairs if source == lane]
             if pairs and not named:
@@ -81,7 +81,7 @@ class Links:
             there, (s, entry) = self.roads[other], (0.0, 1) if contact == "start" else (self.roads[other].length, -1)
             joint = _Joint(there, there.sections[0 if entry > 0 else -1], s, entry)
             for target in _lanes_beyond(here, lane_here, way, here.length if way > 0 else 0.0, joint, named):
-                found = not is_back
+                is_listed = not is_back
                 yield LaneLink(other, target, s, entry)
 
     def _joints(self, road: int, way: int) -> Iterator[tuple[int, str, Pairs | None, bool]]:
