@@ -44,8 +44,10 @@ style: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
+# And what tests say of names, pages and links: a minute.
 lint: style
 	$(BIN)/mypy
+	$(BIN)/python -m pytest -q -m lint
 
 # mypy runs as one of the tests (tests/test_front_door.py), beside the others.
 test: style

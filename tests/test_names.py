@@ -21,6 +21,9 @@ VAGUE = frozenset([
 """Words that alone are no name of a constant, a function or a module: an adjective without its noun, a riddle."""
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
+TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in MODULES}
+
+pytestmark = pytest.mark.lint
 
 
 def _named(tree: ast.Module) -> list[tuple[str, int]]:
@@ -41,10 +44,13 @@ def test_the_list_of_vague_names_stays_short() -> None:
     assert len(VAGUE) <= 40
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_names_are_not_vague(path: Path) -> None:
-    named = [(path.stem, 0), *_named(ast.parse(path.read_text(encoding="utf-8")))]
-    vague = [f"{path.name}:{line}: {name}" for name, line in named if name.strip("_").lower() in VAGUE]
+def test_names_are_not_vague() -> None:
+    vague = [
+        f"{path.name}:{line}: {name}"
+        for path in MODULES
+        for name, line in [(path.stem, 0), *_named(TREES[path])]
+        if name.strip("_").lower() in VAGUE
+    ]
     assert not vague
 
 
@@ -66,11 +72,13 @@ def _local_names(tree: ast.Module) -> list[tuple[str, int]]:
     return [*((node.id, node.lineno) for node in names), *arguments]
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_local_names_are_no_riddles(path: Path) -> None:
-    named = _local_names(ast.parse(path.read_text(encoding="utf-8")))
-    riddles = [f"{path.name}:{line}: {name}" for name, line in named
-               if name.strip("_") in RIDDLES and (path.name, name) not in STORED]  # fmt: skip
+def test_local_names_are_no_riddles() -> None:
+    riddles = [
+        f"{path.name}:{line}: {name}"
+        for path in MODULES
+        for name, line in _local_names(TREES[path])
+        if name.strip("_") in RIDDLES and (path.name, name) not in STORED
+    ]
     assert not riddles
 
 
@@ -95,12 +103,11 @@ def _exists(dotted: str) -> bool:
     return any(re.search(rf"\b{re.escape(last)}\b", path.read_text(encoding="utf-8")) for path in homes)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(PACKAGE).as_posix())
-def test_dotted_names_in_backticks_exist(path: Path) -> None:
+def test_dotted_names_in_backticks_exist() -> None:
     """Those that begin with a folder or module of the package; others are of other packages, or of a variable."""
-    text = path.read_text(encoding="utf-8")
-    names = {match[1] for match in DOTTED.finditer(text) if match[1].split(".")[0] in ROOMS}
-    assert not {name for name in names if not _exists(name)}
+    texts = {path.name: path.read_text(encoding="utf-8") for path in MODULES}
+    names = {(name, match[1]) for name, text in texts.items() for match in DOTTED.finditer(text)}
+    assert not {(path, name) for path, name in names if name.split(".")[0] in ROOMS and not _exists(name)}
 
 
 # ---- pages in docstrings and comments ----

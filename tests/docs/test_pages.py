@@ -203,12 +203,16 @@ def test_a_difference_is_the_line_that_is_not_printed():
     assert difference("a", "a\nb") == "more is printed: b"
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_links_lead_somewhere(page):
-    path = ROOT / page
-    text = BLOCK.sub("", path.read_text(encoding="utf-8"))
-    for target in re.findall(r"\]\((?!https?:|mailto:)([^)#\s]+)", text):
-        assert (path.parent / unquote(target)).exists(), f"{page}: {target}"
+@pytest.mark.lint
+def test_links_lead_somewhere():
+    texts = {page: BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8")) for page in PAGES}
+    links = [
+        (page, target)
+        for page, text in texts.items()
+        for target in re.findall(r"\]\((?!https?:|mailto:)([^)#\s]+)", text)
+    ]
+    assert len(links) > 100
+    assert [link for link in links if not ((ROOT / link[0]).parent / unquote(link[1])).exists()] == []
 
 
 def test_files_that_contributing_names_are_there():

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from xosc_lateral.base.names import in_csv
 from xosc_lateral.files.columns import comma_numbers, indicators, plain_cells, seconds_of_stamps
 from xosc_lateral.files.mapping import UNITS, factor, is_measured, spelled
-from xosc_lateral.files.output_tables import harmless
 
 
 # ---- units -----------------------------------------------------------------------------------------------------------
@@ -148,7 +148,7 @@ def test_a_label_of_the_drive_is_no_context() -> None:
     [("=1+1", "'=1+1"), ("+49", "'+49"), ("-x", "'-x"), ("@a", "'@a"), ("\tx", "'\tx"), ("ego", "ego"), ("", "")],
 )
 def test_no_spreadsheet_takes_a_name_for_a_formula(text: str, expected: str) -> None:
-    assert harmless(text) == expected
+    assert in_csv(text) == expected
 
 
 def test_cells_with_lists_and_bytes_become_text() -> None:

@@ -46,6 +46,8 @@ UNPACKED_SIZE = Limit(4000, "MB", "unpacked size of a gz, zip or Parquet file", 
 TABLE_CELLS = Limit(250e6, "", "cells of a table", "2 GB as doubles: 24 h at 50 Hz with 57 columns")
 TABLE_COLUMNS = Limit(2000, "", "columns of a table", "bus logs have hundreds; beyond, it is transposed")
 PROFILE_SIZE = Limit(50, "MB", "size of a driver profile", "fitted ones have less than 1 MB")
+RESPONSE = Limit(600, "s", "lag, preview or response time of an effect", "drivers look seconds ahead and tire in hours")
+COURSE = Limit(100, "", "shifts in time of an effect's course", "fitted ones have three; each costs a row per step")
 JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
 XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
 
@@ -66,6 +68,14 @@ JOB_TIMEOUT = Limit(
     600, "s", "time for one scenario", "field scenarios take a second; 500 entities for a minute take half of one"
 )
 JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
+
+REPEATED_RUNS = Limit(
+    20, "", "runs of an action that offsets follow", "more is one that runs at every step, and never lets go"
+)
+
+PARSER_TIME = Limit(120, "s", "time that a library may read a file for", "a small one takes a second")
+PARSER_TIME_PER_SIZE = Limit(4, "s", "more for each MB of the file", "a trace of OSI takes up to one")
+PARSER_MEMORY = Limit(4000, "MB", "memory to read a file with, and three times its size", "as for one scenario")
 
 LIVE_PAUSE = Limit(60, "s", "time between two steps of a running simulation", "300 steps of a driver: a second or two")
 LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -40,11 +43,11 @@ def _of_container() -> float:
     if group is None:
         return float("inf")
     free, folder = float("inf"), Path("/sys/fs/cgroup", group.lstrip("/"))
-    for one in (folder, *folder.parents):
-        limit, used = (_lines(one / name)[:1] for name in ("memory.max", "memory.current"))
+    for place in (folder, *folder.parents):
+        limit, used = (_lines(place / name)[:1] for name in ("memory.max", "memory.current"))
         if limit and used and limit[0].strip() != "max":
             free = min(free, float(limit[0]) - float(used[0]))
-        if one == Path("/sys/fs/cgroup"):
+        if place == Path("/sys/fs/cgroup"):
             break
     return free
 
@@ -54,3 +57,23 @@ def _lines(path: str | Path) -> list[str]:
         return Path(path).read_text().splitlines()
     except OSError:
         return []
+
+
+@contextmanager
+def address_space(megabytes: float) -> Iterator[None]:
+    """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
+    size = status_bytes(0)
+    if size == 0 or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    allowed = size + int(1e6 * megabytes)
+    if hard != resource.RLIM_INFINITY:
+        allowed = min(allowed, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Sequence
 from typing import Any
+
+_CONTROLS = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]+")
 
 
 def composed(value: Any) -> Any:
     """A text with its accents in one piece (Unicode's NFC), as most keyboards have them and macOS' file names don't.
 
+    Line breaks and the like, which headers of spreadsheets have and a name may not (`names.unwritable`), are spaces.
     Also all texts in mappings and lists; anything else stays as it is.
     """
     if isinstance(value, str):
-        return value if value.isascii() else unicodedata.normalize("NFC", value)
+        text = value if value.isascii() else unicodedata.normalize("NFC", value)
+        return text if text.isprintable() else _CONTROLS.sub(" ", text)
     if isinstance(value, dict):
         return {composed(key): composed(one) for key, one in value.items()}
     return [composed(one) for one in value] if isinstance(value, list) else value

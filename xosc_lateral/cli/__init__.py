@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.source import guarding_inputs
@@ -138,12 +139,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            line = f"xosc-lateral: {' '.join(_in_words(error).split())}"
+            line = in_terminal(f"xosc-lateral: {' '.join(_in_words(error).split())}")
             if "--log-json" in words:
                 line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
             print(line, file=sys.stderr)
             if "--json" in words:
-                print(json.dumps(_as_dict(error), ensure_ascii=False))
+                print(in_json(_as_dict(error)))
             code = 1
     except (typer.Abort, KeyboardInterrupt, Interrupted) as error:
         print(

@@ -14,7 +14,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Tables, Written, command
+from xosc_lateral.cli.words import Options, Tables, Written, command, say
 
 # What is said of one option stays together.
 # fmt: off
@@ -49,7 +49,7 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
 
             yield show
     except (KeyboardInterrupt, Interrupted):
-        typer.echo(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
+        say(f"xosc-lateral: stopped at: {phase}; nothing is written yet", err=True)
         raise
 
 
@@ -66,6 +66,7 @@ def close_loop(
     reply: Written,
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
+    from xosc_lateral.files.atomic import together
     from xosc_lateral.files.output_paths import claim, output_file, output_folder
     from xosc_lateral.workflows.profiles.loop import ClosedLoop
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
@@ -74,6 +75,7 @@ def close_loop(
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=reply.force)
     with shown_progress("closing the loop", reply.quiet) as progress:
         result = xl.close_loop(tables, name=written.stem, progress=progress, **options)
-    xl.write_profile(result.profile, written, force=reply.force)
-    result.write_report(report, force=reply.force)
+    with together():
+        xl.write_profile(result.profile, written, force=reply.force)
+        result.write_report(report, force=reply.force)
     reply.say(result)

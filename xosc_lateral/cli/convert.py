@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say_json, warn, write_stdout
+from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
@@ -66,7 +66,8 @@ def convert(
     options = {**settings, "force": reply.force}
     report = batch.get("report")
     if len(scenario) == 1 and is_single(scenario[0]):
-        _convert_one(Path(scenario[0]), output, options, batch["variants"], report, osi, reply)
+        limits = {"timeout": batch["job_timeout"], "memory": batch["job_memory"]}
+        _convert_one(Path(scenario[0]), output, options, limits, batch["variants"], report, osi, reply)
         return
     if osi is not None:
         raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
@@ -93,19 +94,27 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path, output: str | None, options: dict[str, Any], variants: int, report: str | None, osi: str | None,
-    reply: Written,
+    source: Path, output: str | None, options: dict[str, Any], limits: Mapping[str, float], variants: int,
+    report: str | None, osi: str | None, reply: Written,
 ) -> None:
+    from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, numbered, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
+    def limited(target: Path | None, **more: Any) -> Conversion:
+        try:
+            return within_limits(lambda path: convert(source, path, **more, **options), target, JobLimits(**limits))
+        except JobLimitError as error:
+            raise JobLimitError(f"{source}: {error}") from error
+
     if output == STDOUT:
         if variants > 1 or reply.as_json or osi is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
-        result = convert(source, None, report=report, **options)
+        result = limited(None, report=report)
         write_stdout(result.data)
         reply.say(result, err=True)
         _warn_if_cut_off(result, reply.quiet)
@@ -124,9 +133,10 @@ def _convert_one(
         claim([*outputs, *pages, *both], [source], force=reply.force)
         unclean = False
         for variant, (path, its_page, its_trace) in enumerate(files, start=1):
-            result = convert(source, path, variant=variant, report=its_page, **options)
-            if its_trace is not None:
-                result.write_osi(its_trace, force=True)
+            with together():
+                result = limited(path, variant=variant, report=its_page)
+                if its_trace is not None:
+                    result.write_osi(its_trace, force=True)
             reply.say(result)
             _warn_if_cut_off(result, reply.quiet or reply.as_json)
             unclean |= bool(result.warnings) or not result.enriched
@@ -151,7 +161,7 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
         if signal.finished < 0:
             raise
         what = f"{signal.finished} outputs in {output} are finished, and the same command continues"
-        typer.echo(f"xosc-lateral: interrupted; {what}", err=True)
+        say(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
     if result.cut_off and (reply.quiet or reply.as_json):

@@ -34,11 +34,14 @@ def detect(
     reply: Written,
 ) -> None:
     """Count false alarms in lane keeping, cut-ins seen and the time before the marking, source by source."""
+    from xosc_lateral.files.atomic import together
+
     table, page = reply.claim(sources, table=(output, "detection.csv"), page=(report, "detection.html"))
     with naming_option("--detector"):
         result = xl.detect(sources, **options)
-    if table is not None:
-        result.write(table, force=reply.force)
-    if page is not None:
-        result.write_report(page, force=reply.force)
+    with together():
+        if table is not None:
+            result.write(table, force=reply.force)
+        if page is not None:
+            result.write_report(page, force=reply.force)
     reply.say(result)

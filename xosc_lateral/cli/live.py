@@ -12,7 +12,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Force, Options, Osi, Quiet, Verbose, Written, command, warn
+from xosc_lateral.cli.words import Force, Options, Osi, Quiet, Verbose, Written, command, say, warn
 from xosc_lateral.workflows.options import Paths
 
 if TYPE_CHECKING:
@@ -39,14 +39,17 @@ class Outputs:
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
+        from xosc_lateral.files.atomic import together
+
         table, trace = reply.claim(
             [source], table=(self.states, "states.csv"), trace=(self.osi, f"{source.stem}_gt.mcap")
         )
         run = live(source, **options)
-        if table is not None:
-            run.write(table, force=reply.force)
-        if trace is not None:
-            run.write_osi(trace, force=reply.force)
+        with together():
+            if table is not None:
+                run.write(table, force=reply.force)
+            if trace is not None:
+                run.write_osi(trace, force=reply.force)
         warn(run.warnings)
         reply.say(run)
 
@@ -132,7 +135,7 @@ def fmu(
     platforms = xl.export_fmu(driver, output, fmi=fmi, python=python, compilers=compiler or ())
     content = "calling Python" if python else f"C source, binaries for {', '.join(platforms) or 'no platform'}"
     if not quiet:
-        typer.echo(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
+        say(f"{driver.name} as FMI {fmi} in {output}: {content}", err=True)
 
 
 @command(export, "c", "C99 source for a test bench.", "export c -p motorway -o driver/")
@@ -144,4 +147,4 @@ def c_source(
     """Write a driver as C99 without dependencies: header, source, numbers, a CMake file and an example loop."""
     written = xl.export_c(xl.read_profile(profile, library), output, force=force)
     if not quiet:
-        typer.echo(f"wrote {', '.join(str(path) for path in written)}", err=True)
+        say(f"wrote {', '.join(str(path) for path in written)}", err=True)

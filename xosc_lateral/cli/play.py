@@ -20,6 +20,7 @@ from xosc_lateral.cli.words import (
     Written,
     command,
     pairs,
+    say,
     say_json,
     warn,
     write_stdout,
@@ -48,21 +49,24 @@ def play(
     """Play a scenario without offsets and write every entity's position at every step."""
     if output is None and osi is None:
         raise typer.BadParameter("a table or, with --osi, a trace has to be named", param_hint="--output")
+    from xosc_lateral.files.atomic import together
+
     stem = scenario.stem
     table, trace = reply.claim([scenario], table=(output, f"{stem}.csv"), trace=(osi, f"{stem}_gt.mcap"))
     played = xl.play(scenario, **options)
-    if table is not None:
-        played.write(table, force=reply.force)
-    elif output is not None:
-        write_stdout(played.csv())
-    if trace is not None:
-        played.write_osi(trace, force=reply.force)
+    with together():
+        if table is not None:
+            played.write(table, force=reply.force)
+        elif output is not None:
+            write_stdout(played.csv())
+        if trace is not None:
+            played.write_osi(trace, force=reply.force)
     if reply.as_json:
         traces = {} if trace is None else {"osi": str(trace)}
         say_json({"output": None if table is None else str(table), **traces, **played.to_dict()})
     elif not reply.quiet:
         for note in played.notes:
-            typer.echo(note, err=True)
+            say(note, err=True)
     warn(played.warnings)
     if options["strict"] and reply.quiet:
         warn(played.doubts)
@@ -99,7 +103,7 @@ def view(
     page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
     warn(played.warnings)
     if not quiet:
-        typer.echo(str(page))
+        say(str(page))
     if open_page or (open_page is None and sys.stdout.isatty()):
         typer.launch(page.absolute().as_uri())
 

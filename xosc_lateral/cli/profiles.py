@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Printing, Written, command, say_json, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, write_stdout
 from xosc_lateral.workflows.profiles import profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
@@ -47,7 +47,7 @@ def show(
         say_json(card(driver))
     elif not reply.quiet:
         beside = [effect for effect in driver.effects if NEIGHBOURS.intersection(effect.columns)]
-        typer.echo("\n".join([card_text(driver), *(f"  converted  {one}" for one in proofs_of(driver, beside))]))
+        say("\n".join([card_text(driver), *(f"  converted  {one}" for one in proofs_of(driver, beside))]))
 
 
 @command(
@@ -177,8 +177,8 @@ def check(*, options: Annotated[Options, xl.read_profile], reply: Printing) -> N
         say_json({"checked": len(entries), "problems": problems})
     else:
         for problem in wrong:
-            typer.echo(problem)
+            say(problem)
         if not reply.quiet:
-            typer.echo(f"{len(entries)} files, {len(wrong)} with problems")
+            say(f"{len(entries)} files, {len(wrong)} with problems")
     if wrong:
         raise typer.Exit(1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hi
 import typer
 
 from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
 
 if TYPE_CHECKING:
@@ -86,15 +86,20 @@ def naming_option(option: str) -> Iterator[None]:
         raise typer.BadParameter(str(error), param_hint=option) from error
 
 
+def say(text: object, *, err: bool = False) -> None:
+    """Lines on standard output or standard error: names that others gave do not steer the terminal."""
+    typer.echo(in_terminal(str(text)), err=err)
+
+
 def warn(lines: Iterable[str]) -> None:
     """Say on standard error what has to be known whatever was asked to be kept quiet."""
     for line in lines:
-        typer.echo(f"xosc-lateral: warning: {line}", err=True)
+        say(f"xosc-lateral: warning: {line}", err=True)
 
 
 def say_json(values: Any) -> None:
     """One line of JSON on standard output."""
-    typer.echo(json.dumps(values, ensure_ascii=False, allow_nan=False))
+    typer.echo(in_json(values))
 
 
 def write_stdout(data: str | bytes) -> None:
@@ -131,14 +136,14 @@ class Printing:
         if self.as_json:
             say_json(result.to_dict())
         elif even or not self.quiet:
-            typer.echo(str(result), err=err)
+            say(result, err=err)
 
     def say_words(self, words: str, values: Any, *, err: bool = True) -> None:
         """Words, on standard error for what is no output; or, where there are any, values as JSON."""
         if self.as_json and values is not None:
             say_json(values)
         elif not self.quiet:
-            typer.echo(words, err=err)
+            say(words, err=err)
 
     def say_written(self, paths: Path | Sequence[Path], **values: Any) -> None:
         """Paths of files, a line each."""
@@ -147,7 +152,7 @@ class Printing:
             say_json({**values, **written})
         elif not self.quiet:
             for path in [paths] if isinstance(paths, Path) else paths:
-                typer.echo(path)
+                say(path)
 
 
 @dataclass(frozen=True, slots=True)

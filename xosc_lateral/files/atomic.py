@@ -1,15 +1,17 @@
-"""Writing a file so that it is there completely, or not at all."""
+"""Writing files so that they are there completely, or not at all: one, or all of an output (`together`)."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import re
+import secrets
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
@@ -30,9 +32,9 @@ def files_of_run(run: str) -> Iterator[None]:
         _RUN.reset(token)
 
 
-def temporary_files(runs: Iterable[str]) -> re.Pattern[str]:
-    """Names that temporary files of these runs have."""
-    return re.compile(rf"\..+\.(?:{'|'.join(map(re.escape, runs))})-[0-9a-z_]{{8}}\.tmp(?:\.\w+)?")
+def temporary_files(runs: Iterable[str] = ()) -> re.Pattern[str]:
+    """Names that temporary files of these runs have, or of any; its first group is how the output's name begins."""
+    return re.compile(rf"\.(.+)\.(?:{'|'.join(map(re.escape, runs)) or '[^.]+'})-[0-9a-z_]{{8}}\.tmp(?:\.\w+)?")
 
 
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
@@ -54,35 +56,138 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
 
 
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside the output, then move it there; an input (`guarding_inputs`) stays."""
+    """Let `write` fill a temporary file beside the output, then move it there; an input (`guarding_inputs`) stays.
+
+    Within `together` it is moved when that ends.
+    """
     path = Path(path)
     refuse_guarded(path)
-    try:
-        with _temporary_beside(path) as temporary:
-            write(temporary)
-            temporary.replace(path)
-    except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
-    LOG.info("wrote %s", path)
+    with ExitStack() as alone, _naming(path):
+        staged, kept = _STAGED.get() or ({}, alone)
+        temporary = kept.enter_context(_temporary_beside(path, path.suffix))
+        write(temporary)
+        staged[path] = temporary
+        if kept is alone:
+            _move(staged)
     return path
 
 
+_STAGED: ContextVar[tuple[dict[Path, Path], ExitStack] | None] = ContextVar("staged", default=None)
+
+
 @contextmanager
-def _temporary_beside(path: Path) -> Iterator[Path]:
-    # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
-    path.parent.mkdir(parents=True, exist_ok=True)
-    prefix = f".{path.stem[:40]}.{_RUN.get() or os.getpid()}-"
-    descriptor, name = tempfile.mkstemp(prefix=prefix, suffix=f".tmp{path.suffix}", dir=path.parent)
-    os.close(descriptor)
-    temporary = Path(name)
-    mask = os.umask(0)
-    os.umask(mask)
+def together() -> Iterator[None]:
+    """Files that are written in the block appear when it ends, all of them, and none where it fails.
+
+    A file beside the first of them says what is being moved where, for as long as it takes: of a run that is killed
+    meanwhile, the next one moves the rest (`mend`). A block within another one is part of it.
+    """
+    if _STAGED.get() is not None:
+        yield
+        return
+    with ExitStack() as kept:
+        staged: dict[Path, Path] = {}
+        token = _STAGED.set((staged, kept))
+        try:
+            yield
+        finally:
+            _STAGED.reset(token)
+        first = next(iter(staged), None)
+        if first is not None and len(staged) > 1:
+            with _naming(first):
+                plan = {os.path.relpath(path, first.parent): temporary.name for path, temporary in staged.items()}
+                kept.enter_context(_temporary_beside(first, _PLAN)).write_text(json.dumps(plan), "utf-8")
+        _move(staged)
+
+
+def _move(staged: Mapping[Path, Path]) -> None:
+    """Move temporary files to their places; once begun, it is gone through with."""
     try:
-        temporary.chmod(0o666 & ~mask)  # mkstemp makes it private; outputs are for everybody
+        for path, temporary in staged.items():
+            with _naming(path):
+                temporary.replace(path)
+            LOG.info("wrote %s", path)
+    except BaseException:
+        for path, temporary in staged.items():
+            with contextlib.suppress(OSError):
+                temporary.replace(path)
+        raise
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:  # of a full disk, say: libraries name no file, or one that nobody knows
+        raise OSError(error.errno or errno.EIO, error.strerror or str(error), str(path)) from error
+
+
+_PLAN = ".moves"  # suffix of what says which temporary files are moved where
+_STEM = 40  # characters of an output's name that its temporary file begins with
+
+
+@contextmanager
+def _temporary_beside(path: Path, suffix: str) -> Iterator[Path]:
+    # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it. It is locked for as long as it is used.
+    made = [folder for folder in path.parents if not folder.exists()]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    name = f".{path.stem[:_STEM]}.{_RUN.get() or os.getpid()}-{secrets.token_hex(4)}.tmp{suffix}"
+    temporary = path.with_name(name)
+    descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o666)
+    try:
+        _lock(descriptor)
         yield temporary
     finally:
+        os.close(descriptor)
         with contextlib.suppress(FileNotFoundError):
             temporary.unlink()
+        with contextlib.suppress(OSError):  # where nothing came of it
+            for folder in made:
+                folder.rmdir()
+
+
+def _lock(descriptor: int) -> bool:
+    """Take a file's lock, which ends with the process; False: somebody holds it, or the system has none."""
+    try:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+def mend(outputs: Iterable[Path]) -> None:
+    """Finish what killed runs were moving to these places, and remove what they had only begun to write.
+
+    Files of a run that is at work are locked, and stay; so do links, and files of other users.
+    """
+    begun = temporary_files()
+    stems: dict[Path, set[str]] = {}
+    for output in outputs:
+        stems.setdefault(output.parent, set()).update((output.stem[:_STEM], output.name[:_STEM]))
+    for folder, wanted in stems.items():
+        matches = {path: begun.fullmatch(path.name) for path in folder.glob(".*.tmp*")}
+        mine = [path for path, match in matches.items() if match is not None and match[1] in wanted]
+        for path in sorted(mine, key=lambda path: path.suffix != _PLAN):
+            with contextlib.suppress(OSError, FormatError), open_own(path, flags=0) as file:
+                if not _lock(file.fileno()):
+                    continue
+                if path.suffix == _PLAN:
+                    with contextlib.suppress(
+                        ValueError, AttributeError, TypeError
+                    ):  # half of a plan: nothing was moved
+                        _finish(folder, json.loads(file.read()), begun)
+                path.unlink()
+
+
+def _finish(folder: Path, plan: Mapping[str, str], begun: re.Pattern[str]) -> None:
+    """Move what is left to move; a plan says nothing but which temporary file of an output becomes it."""
+    for relative, name in plan.items():
+        path = folder / relative
+        match = begun.fullmatch(name)
+        if match and match[1] == path.stem[:_STEM] and (path.parent / name).is_file():
+            (path.parent / name).replace(path)
 
 
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -90,16 +195,16 @@ _LINKS = (errno.ELOOP, errno.EMLINK, errno.ENOTDIR)  # what systems answer where
 _LINK = "is a link, which is not followed here: remove it"
 
 
-def open_own(path: Path) -> IO[bytes]:
+def open_own(path: Path, flags: int = os.O_CREAT) -> IO[bytes]:
     """Open a file for reading and writing, made if it is not there; links and files of others are refused."""
     if not hasattr(os, "O_DIRECTORY"):  # Windows: links need a privilege there
-        return os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT | _PLAIN), "r+b")
+        return os.fdopen(os.open(path, os.O_RDWR | flags | _PLAIN), "r+b")
     here = path.parent
     try:
         folder = os.open(here, os.O_RDONLY | os.O_DIRECTORY | _PLAIN)
         try:
             here = path
-            descriptor = os.open(path.name, os.O_RDWR | os.O_CREAT | _PLAIN, 0o666, dir_fd=folder)
+            descriptor = os.open(path.name, os.O_RDWR | flags | _PLAIN, 0o666, dir_fd=folder)
         finally:
             os.close(folder)
     except OSError as error:

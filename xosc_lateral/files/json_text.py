@@ -14,6 +14,8 @@ from xosc_lateral.base.limits import JSON_DEPTH
 
 _STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
 
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")  # of a character that JSON writes in two escapes
+
 _BRACKETS = re.compile(r"[\[\]{}]")
 
 
@@ -28,7 +30,12 @@ def parse_json(data: bytes, path: Path) -> Any:
     except ValueError as error:
         raise FormatError(str(error), path=path) from error
     try:
-        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        values = json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        if _HALF.search(text):
+            json.dumps(values, ensure_ascii=False).encode()
+        return values
+    except UnicodeEncodeError as error:
+        raise FormatError("not JSON: half a character (a \\u escape without its other half)", path=path) from error
     except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
     except ValueError as error:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.atomic import mend
 from xosc_lateral.files.source import file_hash
 
 STDOUT = "-"  # name of the standard output where an output is asked for
@@ -58,9 +59,13 @@ def output_folder(output: str | Path) -> Path:
 
 
 def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
-    """Refuse outputs as `refuse_outputs` does, and, without `force`, files that this package did not write."""
+    """Refuse outputs as `refuse_outputs` does, and, without `force`, files that this package did not write.
+
+    What killed runs have left of these outputs is mended before.
+    """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)
+    mend(wanted)
     for output in wanted:
         if not force and output.exists() and not is_own(output):
             raise FormatError("exists and was not written by xosc-lateral; --force replaces it", path=output)

@@ -12,21 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.names import in_csv
 from xosc_lateral.base.version import __version__
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import SIDECAR_SUFFIX
 from xosc_lateral.files.source import hash_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-
-
-def harmless(text: str) -> str:
-    """Text that no spreadsheet takes for a formula, by an apostrophe before it (OWASP, "CSV Injection")."""
-    return f"'{text}" if text.startswith(_FORMULA) else text
-
 
 METADATA_KEY = b"xosc-lateral"  # key of the provenance in a Parquet file's schema metadata
 Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
@@ -67,8 +60,9 @@ def write_table(
         return
     data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)
     record = stamped(provenance) | {"sha256": hash_of(data)}
-    write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
-    write_atomically(path, data)
+    with together():
+        write_atomically(path, data)
+        write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
 
 
 def csv_text(frame: pd.DataFrame) -> str:
@@ -79,12 +73,12 @@ def csv_text(frame: pd.DataFrame) -> str:
 def harmless_frame(frame: pd.DataFrame) -> pd.DataFrame:
     """The table with words that no spreadsheet takes for a formula."""
     words = {
-        name: frame[name].map(lambda value: harmless(value) if isinstance(value, str) else value)
+        name: frame[name].map(lambda value: in_csv(value) if isinstance(value, str) else value)
         for name in frame.columns
         if frame[name].dtype.kind not in "fiubM"
     }
     frame = frame.assign(**words) if words else frame
-    return frame.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
+    return frame.rename(columns=lambda name: in_csv(name) if isinstance(name, str) else name)
 
 
 def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
@@ -137,5 +131,5 @@ def _columns(motion: EntityMotion, network: RoadNetwork, text: Callable[[str], s
 
 
 def _quoted(text: str) -> str:
-    text = harmless(text)
+    text = in_csv(text)
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\r\n') else text

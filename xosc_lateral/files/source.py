@@ -15,7 +15,7 @@ import hashlib
 import io
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -117,6 +117,17 @@ def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
 def last_read(path: Path) -> str:
     """SHA-256 of the bytes that this process parsed under that path last; `KeyError` if it parsed none."""
     return _LAST_READ[str(path)]
+
+
+def parsed_files() -> Mapping[str, str]:
+    """Path -> SHA-256 of what this process parsed last under it."""
+    return _LAST_READ
+
+
+def take_over(path: Path, digest: str) -> None:
+    """Count a file as an input of this process that another one parsed for it; `digest`: SHA-256 of what it parsed."""
+    _remember(path, digest)
+    guard_input(path)
 
 
 def check_regular(path: Path) -> os.stat_result:

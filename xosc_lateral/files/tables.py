@@ -7,7 +7,7 @@ import gzip
 import io
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
+from xosc_lateral.files.apart import apart
 from xosc_lateral.files.columns import plain_cells
 from xosc_lateral.files.source import Source, open_source, parsed_hash
 
@@ -50,12 +51,17 @@ def read_text_table(path: Path) -> pd.DataFrame:
 
 
 def _read(path: Path, encoding: str | None = None, separator: str | None = None, **csv: Any) -> pd.DataFrame:
+    if path.name.lower().endswith(PARQUET):
+        with foreign_errors(path, "can't be read as a table"):
+            table: pd.DataFrame = read_parquet(path).to_pandas()
+            if not table.columns.is_unique:
+                twice = str(table.columns[table.columns.duplicated()][0])
+                raise FormatError(f"column {twice!r} appears twice", path=path)
+            return table.rename(columns=composed)
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if path.name.lower().endswith(PARQUET):
-            return _read_parquet(source).rename(columns=composed)
         text = _in_utf8(unpacked_text(source), path, encoding)
         separator = separator or _separator(text, path)
-        table: pd.DataFrame = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
+        table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
         return table.rename(columns=composed)
 
 
@@ -154,24 +160,28 @@ def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[byt
         raise FormatError(what, path=path) from error
 
 
-def _read_parquet(source: Source) -> pd.DataFrame:
+@apart
+def read_parquet(path: Path, columns: Sequence[str] | None = None, otherwise: str = "") -> Any:
+    """A Parquet file, or some columns of it, as an Arrow table.
+
+    Raises `FormatError`: it is none, or beyond `limits`; `otherwise`: what it is not where it lacks a column.
+    """
     import pyarrow.parquet as pq
 
-    with pq.ParquetFile(source.file) as file:
-        about = file.metadata
+    with open_source(path) as source, foreign_errors(path, "can't be read as Parquet"):
+        file = pq.ParquetFile(source.file)
+        about, known = file.metadata, file.schema_arrow.names
+        if missing := [name for name in columns or () if name not in known]:
+            raise FormatError(f"no column {missing[0]!r}: {otherwise}", path=path)
         groups = range(about.num_row_groups)
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
-        rows, columns = about.num_rows, about.num_columns
-        if columns > TABLE_COLUMNS.value:
-            raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
-        if rows * columns > TABLE_CELLS.value:
-            raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
-        source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
-        table: pd.DataFrame = file.read().to_pandas()
-    if not table.columns.is_unique:
-        twice = str(table.columns[table.columns.duplicated()][0])
-        raise FormatError(f"column {twice!r} appears twice", path=source.path)
-    return table
+        rows, count = about.num_rows, about.num_columns
+        if count > TABLE_COLUMNS.value:
+            raise FormatError(TABLE_COLUMNS.refusal(count), path=path)
+        if rows * count > TABLE_CELLS.value:
+            raise FormatError(TABLE_CELLS.refusal(rows * count), path=path)
+        source.unpacked(rows * count * _DOUBLE)  # a thousand million equal values take a few bytes in the file
+        return file.read(None if columns is None else list(columns))
 
 
 def _separator(text: IO[bytes], path: Path) -> str:

@@ -39,7 +39,7 @@ def verdict(sampled: list[np.ndarray], valid_below: float | None = None, *, reso
 def test_movement_of_the_same_spectrum_is_like_real_drivers() -> None:
     found = verdict(paths(1))
     assert found.like_up_to == 1.5 and all(band.ratio == pytest.approx(1.0, abs=0.3) for band in found.bands)
-    assert found.in_words() == "like other real drivers up to 1.5 Hz, all that is compared"
+    assert found.in_words() == "power like other real drivers' up to 1.5 Hz, all that is compared"
 
 
 @pytest.mark.parametrize(("factor", "side"), [(0.2, "below"), (5.0, "above")])
@@ -47,14 +47,14 @@ def test_the_frequency_is_named_from_which_on_power_lacks(factor: float, side: s
     found = verdict(paths(1, factor=factor, above=0.32))
     assert found.like_up_to == pytest.approx(0.32)
     words = found.in_words()
-    assert words.startswith(f"like other real drivers up to 0.32 Hz; {side} them from 0.32 Hz on (")
+    assert words.startswith(f"power like other real drivers' up to 0.32 Hz, {side} theirs from 0.32 Hz on (")
     ratio = next(band.ratio for band in found.bands if not band.is_like)
     assert ratio == pytest.approx(factor, rel=0.3)
 
 
 def test_only_what_the_recording_shows_is_compared() -> None:
     found = verdict(paths(1, factor=0.01, above=0.2), valid_below=0.16)
-    assert found.in_words() == "like other real drivers up to 0.16 Hz, all that is compared"
+    assert found.in_words() == "power like other real drivers' up to 0.16 Hz, all that is compared"
     assert "the recording shows too little for any" in found.alarm_words()
     assert not found.shows_alarms and verdict(paths(1), valid_below=0.5).shows_alarms
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import random
 import tracemalloc
+from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +35,7 @@ from xosc_lateral.drivers.model.effects import (
 )
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
-from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.drivers.model.stream import OffsetStream, sealed, unsealed
 from xosc_lateral.files.profiles import read_profile
 
 STEP = 0.2
@@ -280,3 +283,62 @@ def test_wrong_use_is_refused() -> None:
         stream.look({})
     with pytest.raises(ValueError, match="lane_width -1"):
         stream.step({"lane_width": -1.0})
+
+
+# ---- states that somebody edited and sealed anew ---------------------------------------------------------------------
+ROAD_CONTEXT = {"speed": 30.0, "lane_width": 3.7, "lane_index": 1.0, "is_truck": 0.0, "left_distance": 20.0}
+
+
+def _leaves(values: object, path: tuple[object, ...] = ()) -> list[tuple[object, ...]]:
+    items = values.items() if isinstance(values, dict) else enumerate(values[:4]) if isinstance(values, list) else ()
+    below = [leaf for key, item in items for leaf in _leaves(item, (*path, key))]
+    return below + ([path] if not isinstance(values, dict) else [])
+
+
+@pytest.mark.parametrize("rate", [None, 50.0])
+def test_an_edited_state_is_refused_or_leads_to_offsets_of_a_lane(rate: float | None) -> None:
+    profile, chance = read_profile("motorway-refined"), random.Random(7)
+    stream = OffsetStream(profile, 3, rate=rate)
+    for _ in range(33):
+        stream.step(ROAD_CONTEXT)
+    whole = unsealed(stream.to_dict())
+    leaves = [path for path in _leaves(whole) if path and path[0] != "profile"]
+    outcomes = Counter[str]()
+    for _ in range(30):
+        values = json.loads(json.dumps(whole))
+        *above, last = chance.choice(leaves)
+        owner = values
+        for key in above:
+            owner = owner[key]
+        old = owner[last]
+        if isinstance(old, list):
+            owner[last] = chance.choice([[], old[:-1], old + old, [None], [[]], [1e9] * len(old)])
+        else:
+            owner[last] = chance.choice([1e300, -1e6, 34.0, 10**30, 2**63, None, "x", -1, 0])
+        try:
+            edited = OffsetStream.from_dict(profile, sealed(values))
+        except DriverProfileError:
+            outcomes["refused"] += 1
+            continue
+        offsets = [edited.step(ROAD_CONTEXT) for _ in range(60)]
+        assert np.abs(offsets).max() < 1.5 * 3.7, (above, last, owner[last])
+        outcomes["fine"] += 1
+    assert min(outcomes.values()) > 3
+
+
+def test_a_state_of_a_driver_far_out_or_not_begun_goes_on() -> None:
+    profile = read_profile("motorway")
+    for stream, steps in ((OffsetStream(profile, 1, start=1.6), 1), (OffsetStream(profile, 1, rate=20.0), 0)):
+        for _ in range(steps):
+            stream.step(ROAD_CONTEXT)
+        state = stream.to_dict()
+        again = OffsetStream.from_dict(profile, sealed(unsealed(state)))
+        assert [again.step(ROAD_CONTEXT) for _ in range(9)] == [stream.step(ROAD_CONTEXT) for _ in range(9)]
+
+
+@pytest.mark.parametrize(
+    "timing", [{"lag_s": -1e6}, {"response_s": 1e7}, {"course": ((1e6, 1.0),)}, {"course": ((0.0, 0.1),) * 500}]
+)
+def test_an_effect_that_looks_days_ahead_is_refused(timing: dict[str, Any]) -> None:
+    with pytest.raises(DriverProfileError, match="at most"):
+        Linear(acts=Acts.LOCATION, column="x", coefficients=(0.1,), errors=(0.1,), reference=(0.0,), **timing)

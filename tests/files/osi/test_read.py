@@ -17,7 +17,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.osi.write import write_osi
 from xosc_lateral.workflows.recordings.importers import import_drives
-from xosc_lateral.workflows.recordings.osi_trace import NANOSECONDS, PLACES
+from xosc_lateral.workflows.recordings.osi_trace import NANOSECONDS, PLACES, ROW_COLUMNS
 from xosc_lateral.world.scenario.enums import VehicleCategory
 
 osi_utilities = pytest.importorskip("osi_utilities")
@@ -363,3 +363,30 @@ def test_parquet_that_is_no_recording_is_refused(trace: Path, tmp_path: Path) ->
     (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
     with pytest.raises(FormatError, match=r"b\.parquet: can't be read as Parquet"):
         import_drives("osi", tmp_path / "b.parquet")
+
+
+@pytest.mark.parametrize("states", [True, False])
+def test_a_chunk_that_unpacks_without_bound_is_refused(states: bool, tmp_path: Path) -> None:
+    """Also where the size stands in the packed frame alone."""
+    writer_module = pytest.importorskip("mcap.writer", reason="extra `osi` is not installed")
+    path = tmp_path / "bomb_gt.mcap"
+    with path.open("wb") as file:
+        writer = writer_module.Writer(file, chunk_size=10**10, compression=writer_module.CompressionType.ZSTD)
+        writer.start("osi2mcap", "")
+        channel = writer.register_channel("gt", "protobuf", writer.register_schema("osi3.GroundTruth", "protobuf", b""))
+        writer.add_message(channel, 0, bytes(150_000_000), 0)
+        writer.finish()
+    data = path.read_bytes()
+    size = (150_000_000).to_bytes(4, "little")[1:]
+    where = next(k for k in range(len(data)) if data[k + 1 : k + 4] == size)
+    if not states:  # a chunk that says it has 4 kB
+        path.write_bytes(data[:where] + (4096).to_bytes(8, "little") + data[where + 8 :])
+    with pytest.raises(FormatError, match="decompression bomb"):
+        import_drives("osi", path)
+
+
+def test_a_recording_of_omega_prime_that_unpacks_without_bound_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.parquet"
+    pq.write_table(pa.table({name: pa.array(np.zeros(3_000_000)) for name in ROW_COLUMNS}), path, compression="zstd")
+    with pytest.raises(FormatError, match="decompression bomb"):
+        import_drives("osi", path)

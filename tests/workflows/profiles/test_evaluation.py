@@ -88,7 +88,11 @@ def test_a_profiles_card_is_a_page(tmp_path):
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
     assert main(["evaluate", "-p", str(profile), str(table), "--no-classify"]) == 0
     text = capsys.readouterr().out
-    assert "snippets of 10 s" in text and "near a marking, measured" in text and "classifier AUC: not computed" in text
+    assert (
+        "snippets of 10 s" in text
+        and "comes near a marking, measured" in text
+        and "classifier AUC: not computed" in text
+    )
 
 
 def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, profile, tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.workflows.recordings.importers.mf4 import import_mf4
+from xosc_lateral.workflows.recordings.importers.mf4 import channel_names, import_mf4, read_channels
 
 
 @pytest.fixture
@@ -86,7 +87,47 @@ def test_a_file_that_is_no_log_is_refused_with_and_without_a_map(log, capsys):
 def test_without_asammdf_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)
     with pytest.raises(FormatError, match=r"xosc-lateral\[mdf\]"):
-        import_mf4(tmp_path / "a.mf4", MAP)
+        read_channels.__wrapped__(tmp_path / "a.mf4", {}, None)
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize(
+    ("formula", "what"),
+    [
+        ("2*X1+1", ""),
+        ("__import__('os').system('touch planted')+X1*0", "not known"),
+        ("X1*0+9**9**9**9", "has 0 values"),
+        ("X1.__class__", "not known"),
+    ],
+)
+def test_formulas_of_a_log_are_arithmetic_or_refused(formula, what, tmp_path, monkeypatch):
+    asammdf = pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(0, 60, 0.04)
+    with asammdf.MDF(version="4.10") as mdf:
+        off = asammdf.Signal(0.1 * np.sin(time), time, name="Off", unit="m", conversion={"formula": formula})
+        mdf.append([off, asammdf.Signal(3.5 + 0 * time, time, name="Wid", unit="m")])
+        mdf.save(tmp_path / "log.mf4", overwrite=True)
+    read = partial(import_mf4, tmp_path / "log.mf4", ["offset=Off", "lane_width=Wid"])
+    if what:
+        with pytest.raises(FormatError, match=what):
+            read()
+    else:
+        table = read().to_frame()
+        np.testing.assert_allclose(table["offset"], 1 + 0.2 * np.sin(table["time"]), atol=1e-9)
+    assert not (tmp_path / "planted").exists()
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_log_whose_blocks_unpack_without_bound_is_refused(tmp_path):
+    asammdf = pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
+    time = np.arange(10_000_000) * 1e-3
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append([asammdf.Signal(0.0 * time, np.zeros(len(time)), name="Off")])
+        mdf.save(tmp_path / "bomb.mf4", overwrite=True, compression=2)
+    assert (tmp_path / "bomb.mf4").stat().st_size < 700_000
+    with pytest.raises(FormatError, match="decompression bomb"):
+        channel_names(tmp_path / "bomb.mf4")
 
 
 @pytest.fixture

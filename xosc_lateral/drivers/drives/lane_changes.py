@@ -75,9 +75,9 @@ class Course:
         `in_part`: also of those whose begin or end was not seen.
         """
         rows = np.zeros(len(self.time), dtype=np.bool_)
-        for one in self.maneuvers():
-            if (one.lanes or one.cut) and (in_part or not one.cut):
-                begin, end = self.time[one.first] - margin, self.time[one.last] + margin
+        for change in self.maneuvers():
+            if (change.lanes or change.cut) and (in_part or not change.cut):
+                begin, end = self.time[change.first] - margin, self.time[change.last] + margin
                 rows[slice(*np.searchsorted(self.time, (begin - ON_ROW, end + ON_ROW)))] = True
         return rows
 

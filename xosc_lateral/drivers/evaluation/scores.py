@@ -192,7 +192,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         autocorrelation_real=spectra.autocorrelation(offsets, lags),
         autocorrelation_sampled=spectra.autocorrelation(free, lags),
         margins_real=margins(offsets, widths, step),
-        margins_sampled=margins(free, widths, step),
+        margins_sampled=margins(sample_runs(profile, runs, seed + 4, same_start=False), widths, step),
         traces=_traces(runs, free, step),
         seed=seed,
         below=below,

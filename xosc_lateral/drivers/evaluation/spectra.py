@@ -220,10 +220,12 @@ class Verdict:
             return "no band to compare: runs are too short, or the recording is valid to too little"
         unlike = next((band for band in self.bands if not band.is_like), None)
         if unlike is None:
-            return f"like other real drivers up to {self.like_up_to:g} Hz, all that is compared"
+            return f"power like other real drivers' up to {self.like_up_to:g} Hz, all that is compared"
         side = "below" if unlike.ratio < 1.0 else "above"
-        what = f"{side} them from {unlike.low:g} Hz on ({unlike.ratio:.2f} of their power up to {unlike.high:g} Hz)"
-        return f"like other real drivers up to {self.like_up_to:g} Hz; {what}" if self.like_up_to else f"{what}"
+        what = f"{side} theirs from {unlike.low:g} Hz on ({unlike.ratio:.2f} of it up to {unlike.high:g} Hz)"
+        if self.like_up_to:
+            return f"power like other real drivers' up to {self.like_up_to:g} Hz, {what}"
+        return f"power unlike other real drivers': {what}"
 
     def alarm_words(self) -> str:
         """What a test engineer asks for, in one line."""

@@ -14,6 +14,7 @@ from msgspec import Meta, defstruct, field, structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.names import unwritable
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import any_model
@@ -105,7 +106,7 @@ MAX_LANE_WIDTH = 10.0
 
 
 class DriverProfile(Record, frozen=True):
-    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width."""
+    """What it takes to sample offsets. Raises `DriverProfileError` if a name is none, or its lane width is no width."""
 
     later = ("left_hand", "beside", "validity")
 
@@ -124,6 +125,8 @@ class DriverProfile(Record, frozen=True):
     def __post_init__(self) -> None:
         if not self.name:
             raise DriverProfileError("a profile needs a name")
+        if (why := next(filter(None, map(unwritable, (self.name, *self.columns))), None)) is not None:
+            raise DriverProfileError(f"profile {self.name}: {why}")
         if not 0 < self.lane_width <= MAX_LANE_WIDTH:
             raise DriverProfileError(
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"

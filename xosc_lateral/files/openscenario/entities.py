@@ -7,6 +7,7 @@ from datetime import datetime
 from msgspec.structs import replace
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
+from xosc_lateral.base.names import unwritable
 from xosc_lateral.files.openscenario.context import Context, Reader, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.references import local_scope
@@ -109,6 +110,8 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     name = item.text("name") if name is None else name
     if not name:
         item.fail("attribute 'name' is empty")
+    if (why := unwritable(name)) is not None:
+        item.fail(f"attribute 'name': {why}")
     content = item.child(*CATEGORIES, "CatalogReference")
     if content is None:
         item.fail("contains no Vehicle, Pedestrian, MiscObject or CatalogReference")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.base.names import in_terminal
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
@@ -105,7 +106,9 @@ def convert_many(
         cluster=cluster,
         keep_old=keep_old,
         limits=JobLimits(job_timeout, job_memory),
-        notify=None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True),
+        notify=None
+        if show == "nothing"
+        else lambda line: print(in_terminal(f"xosc-lateral: {line}"), file=sys.stderr, flush=True),
     )
 
     def report_row(outcome: JobOutcome) -> None:

@@ -10,35 +10,13 @@ import ctypes
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.base.memory import status_bytes
-
-
-@contextmanager
-def address_space(megabytes: float) -> Iterator[None]:
-    """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
-    size = status_bytes(0)
-    if size == 0 or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    allowed = size + int(1e6 * megabytes)
-    if hard != resource.RLIM_INFINITY:
-        allowed = min(allowed, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
+from xosc_lateral.base.memory import address_space, status_bytes
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

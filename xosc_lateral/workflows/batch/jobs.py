@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.atomic import make_own_folder, write_atomically
+from xosc_lateral.files.atomic import make_own_folder, together, write_atomically
 from xosc_lateral.files.openscenario.references import require_folders
 from xosc_lateral.files.output_paths import real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
@@ -249,14 +249,15 @@ def convert_job(job: Job) -> ManifestRow:
     _refuse_changes(job)
     for path in filter(None, (job.output, job.page)):
         make_own_folder(path.parent, depth=job.name.count("/"))
-    conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
-    _refuse_changes(job)
-    if job.page is not None:
-        from xosc_lateral.workflows.conversion.page import conversion_page
-        from xosc_lateral.workflows.playing.figures import thumbnail
+    with together():
+        conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
+        _refuse_changes(job)
+        if job.page is not None:
+            from xosc_lateral.workflows.conversion.page import conversion_page
+            from xosc_lateral.workflows.playing.figures import thumbnail
 
-        write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # stands for it in the index
-        write_atomically(job.page, conversion_page(conversion))
+            write_atomically(job.page.with_suffix(".svg"), thumbnail(conversion.movement))  # its sign in the index
+            write_atomically(job.page, conversion_page(conversion))
     return _described(job, conversion)
 
 

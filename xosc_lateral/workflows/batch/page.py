@@ -73,18 +73,18 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
     return page.html({})
 
 
-def by_cause(said: Iterable[tuple[ManifestRow, str]]) -> list[tuple[str, list[ManifestRow]]]:
+def by_cause(remarks: Iterable[tuple[ManifestRow, str]]) -> list[tuple[str, list[ManifestRow]]]:
     """Rows by what was said of them, the most frequent cause first: files, names and numbers in it count as alike."""
-    found: dict[str, tuple[set[str], dict[str, ManifestRow]]] = {}
-    for row, text in said:
+    causes: dict[str, tuple[set[str], dict[str, ManifestRow]]] = {}
+    for row, text in remarks:
         bare = _PLACE.sub("", text)
-        texts, rows = found.setdefault(_VALUE.sub(_ANY, bare), (set(), {}))
+        texts, rows = causes.setdefault(_VALUE.sub(_ANY, bare), (set(), {}))
         texts.add(bare)
         rows[row.output] = row
     named = [
-        (next(iter(texts)) if len(texts) == 1 else cause, [*rows.values()]) for cause, (texts, rows) in found.items()
+        (next(iter(texts)) if len(texts) == 1 else cause, [*rows.values()]) for cause, (texts, rows) in causes.items()
     ]
-    return sorted(named, key=lambda one: (-len(one[1]), one[0]))
+    return sorted(named, key=lambda item: (-len(item[1]), item[0]))
 
 
 def _groups(

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
+from xosc_lateral.base.names import in_terminal
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
 
-NOBODY = "nobody"
+NO_VEHICLE = "nobody"
 """Where no vehicle is under test."""
 
 LINES_EVERY = 30.0
@@ -65,8 +66,8 @@ class Summary:
             reasons = self.anew if outcome.state is JobState.WRITTEN else self.kept
             reasons[outcome.why] = reasons.get(outcome.why, 0) + 1
         self.with_warnings += bool(row.warnings)
-        who = " and ".join(row.ego) or NOBODY
-        self.under_test[who] = self.under_test.get(who, 0) + 1
+        vehicles = " and ".join(row.ego) or NO_VEHICLE
+        self.under_test[vehicles] = self.under_test.get(vehicles, 0) + 1
         if row.cut_off:
             self.cut_off.append(row.output)
         if not row.enriched:
@@ -79,7 +80,7 @@ class Summary:
         if outcome.state is not JobState.FAILED or key in self._shown:
             return ""
         self._shown.add(key)
-        return f"xosc-lateral: {outcome.row.error}"
+        return in_terminal(f"xosc-lateral: {outcome.row.error}")
 
     @property
     def finished(self) -> int:
@@ -100,7 +101,7 @@ class Summary:
         """What a person has to know besides the counts, a line each."""
         lines = []
         if self.under_test:
-            names = sorted(self.under_test.items(), key=lambda item: (item[0] == NOBODY, -item[1], item[0]))
+            names = sorted(self.under_test.items(), key=lambda item: (item[0] == NO_VEHICLE, -item[1], item[0]))
             lines.append(f"  under test, left as written: {', '.join(f'{who} in {count}' for who, count in names)}")
         if self.with_warnings:
             lines.append(f"  {self.with_warnings} with warnings (column `warnings` of the manifest)")

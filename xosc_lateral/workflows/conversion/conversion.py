@@ -11,6 +11,7 @@ from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.model.profile import SIDES
+from xosc_lateral.files.atomic import together
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
@@ -163,9 +164,10 @@ class Conversion(ConvertedScenario, Result):
         host = next(iter(self.ego), None)
         words = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant + 1}"
         paths = [entity.trajectory for entity in made.entities]
-        write_osi(enriched, made.motion, made.network, paths, host=host, description=words)
-        words = f"{self.source.name}, as its maneuvers say"
-        write_osi(nominal, made.motion, made.network, host=host, description=words)
+        nominal_words = f"{self.source.name}, as its maneuvers say"
+        with together():
+            write_osi(enriched, made.motion, made.network, paths, host=host, description=words)
+            write_osi(nominal, made.motion, made.network, host=host, description=nominal_words)
         return outputs
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:

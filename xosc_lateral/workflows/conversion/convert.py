@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Unpack
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import guarding_inputs
@@ -79,11 +79,12 @@ def convert(
     target = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
     claim([None if output is None else target, page], [source], force=force)
-    conversion = convert_scenario(
-        source, target, settings, variant_index=variant - 1, report=page, saves=output is not None
-    )
-    if page is not None:
-        conversion.write_report(page, force=force)
+    with together():
+        conversion = convert_scenario(
+            source, target, settings, variant_index=variant - 1, report=page, saves=output is not None
+        )
+        if page is not None:
+            conversion.write_report(page, force=force)
     return conversion
 
 

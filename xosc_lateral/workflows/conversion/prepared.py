@@ -12,7 +12,7 @@ from xosc_lateral.workflows.conversion.load import Played, load_scenario, play_l
 from xosc_lateral.workflows.conversion.meaning import Meaning, play_until
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
-Kept = TypeVar("Kept")
+Latest = TypeVar("Latest")
 
 
 class Prepared:
@@ -29,18 +29,18 @@ class Prepared:
 
     def meaning(self, egos: tuple[str, ...]) -> Meaning:
         """What happens, also where these vehicles under test drive otherwise."""
-        return self._kept(
+        return self._latest_made(
             "meaning", egos, lambda: Meaning(self.played, egos, step=self._step, time_limit=self._time_limit)
         )
 
     def until(self, end: float) -> Played:
         """The same run, stopped at another time. [s]"""
-        return self._kept("until", end, lambda: play_until(self.played, end, step=self._step))
+        return self._latest_made("until", end, lambda: play_until(self.played, end, step=self._step))
 
     def segmented(self, run: Played, **choices: Any) -> SegmentedRun:
         """One of its runs as drivers see it, see `SegmentedRun`; kept where it is small."""
         key = run.motion, tuple(choices.items())
-        made = self._kept(
+        made = self._latest_made(
             "segmented", key, lambda: SegmentedRun(run.motion, run.network, trailers=run.trailers, **choices)
         )
         if not made.is_small:
@@ -58,7 +58,7 @@ class Prepared:
         road = scenario.road_file
         return road is None or (road.is_file() and road_network(road) is self.loaded.network)
 
-    def _kept(self, name: str, key: Hashable, make: Callable[[], Kept]) -> Kept:
+    def _latest_made(self, name: str, key: Hashable, make: Callable[[], Latest]) -> Latest:
         """The latest of a kind: variants with the same settings come one after another."""
         before, value = self._latest.get(name, (None, None))
         if before != key:

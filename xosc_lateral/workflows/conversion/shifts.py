@@ -19,6 +19,7 @@ from math import inf
 import numpy as np
 from msgspec import Struct
 
+from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
@@ -127,14 +128,15 @@ def _named(key: Key, action: PlayedAction) -> str:
 
 
 def _runs(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
-    """Actions of the source's events, counted for those that run several times."""
+    """Actions of the source's events, counted for those that run several times, up to `limits.REPEATED_RUNS`."""
     runs: dict[Key, PlayedAction] = {}
     numbers: dict[tuple[Path, str | None], int] = {}
     for played in actions:
         if played.path != ("Init",) and not played.path[0].startswith(STORY_PREFIX):
             number = numbers.get((played.path, played.actor), 0)
             numbers[played.path, played.actor] = number + 1
-            runs[played.path, played.actor, number] = played
+            if number < REPEATED_RUNS.value:
+                runs[played.path, played.actor, number] = played
     return runs
 
 

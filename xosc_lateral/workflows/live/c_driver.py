@@ -9,17 +9,18 @@ from pathlib import Path
 from textwrap import wrap
 
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.names import in_c_comment, in_c_identifier
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.live.c_numbers import inputs_of, numbers_of
 
 
 def identifier(profile: DriverProfile) -> str:
     """What names in C begin with."""
-    return "driver_" + re.sub(r"[^0-9A-Za-z]", "_", profile.name)
+    return "driver_" + in_c_identifier(profile.name)
 
 
 def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False) -> list[Path]:
@@ -31,9 +32,9 @@ def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False)
     texts = c_sources(profile) | {name: filled(name, profile) for name in ("CMakeLists.txt", "example.c")}
     written = [output_folder(folder) / name for name in texts]
     claim(written, force=force)
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    for path, text in zip(written, texts.values(), strict=True):
-        write_atomically(path, text.encode())
+    with together():
+        for path, text in zip(written, texts.values(), strict=True):
+            write_atomically(path, text.encode())
     return written
 
 
@@ -44,7 +45,7 @@ def _fields(profile: DriverProfile) -> dict[str, str]:
     """
     columns: dict[str, str] = {}
     for column in inputs_of(profile):
-        field = column if column in CONTEXT_UNITS else "x_" + re.sub(r"[^0-9A-Za-z]", "_", column)
+        field = column if column in CONTEXT_UNITS else "x_" + in_c_identifier(column)
         if field in columns:
             raise DriverProfileError(f"profile {profile.name}: {columns[field]!r} and {column!r} are both {field} in C")
         columns[field] = column
@@ -82,16 +83,14 @@ def _about(profile: DriverProfile) -> str:
     lines = [f"Driver {profile.name} of xosc-lateral {__version__}, in C99."]
     for what, licence in licences.items():
         lines += wrap(f"Licence of the {what}: {licence}", 115) if licence else []
-    text = re.sub(r"[^ -~\n]", "_", "\n * ".join(lines))
-    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", text)  # no end of a comment, and no beginning of another
+    return in_c_comment("\n * ".join(lines))
 
 
 def filled(template: str, profile: DriverProfile, words: Mapping[str, str] | None = None) -> str:
     """A template with words in place of those between @, and names of the profile's own."""
     text = files("xosc_lateral").joinpath("resources", "driver_c", template).read_text(encoding="utf-8")
-    for word, value in (words or {}).items():
-        text = text.replace(f"@{word}@", value)
-    return _named(text, profile)
+    known = words or {}  # in one go: what a profile says is no template
+    return _named(re.sub(r"@([A-Z_]+)@", lambda match: known.get(match[1], match[0]), text), profile)
 
 
 def _named(text: str, profile: DriverProfile) -> str:

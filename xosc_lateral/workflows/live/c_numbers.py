@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from decimal import Decimal, localcontext
 from functools import cache, reduce
@@ -13,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, context_range
+from xosc_lateral.base.names import in_c
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
@@ -129,13 +129,8 @@ def _inputs(profile: DriverProfile) -> list[str]:
         "enum { FAULT_NONE, "
         + ", ".join(f"FAULT_{name}" for name in FAULTS)
         + f", FAULT_COLUMNS, FAULTS = FAULT_COLUMNS + {len(columns)} }};",
-        "static const char *const faults[] = {" + ",\n    ".join(map(_text, texts)) + "};",
+        "static const char *const faults[] = {" + ",\n    ".join(map(in_c, texts)) + "};",
     ]
-
-
-def _text(text: str) -> str:
-    escaped = re.sub(r"[\x00-\x1f]", " ", text).replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
 
 
 def _number(value: object) -> str:

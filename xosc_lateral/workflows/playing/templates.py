@@ -55,15 +55,16 @@ def write_template(name: str, folder: PathLike, *, force: bool = False, **settin
     XoscLateralError
         An unknown template or setting, or a value out of range.
     """
-    from xosc_lateral.files.atomic import write_atomically
+    from xosc_lateral.files.atomic import together, write_atomically
     from xosc_lateral.files.templates import find_template
 
     files = find_template(name).files({key: str(value) for key, value in settings.items()})
     output = output_folder(folder)
     paths = {output / file: text for file, text in files.items()}
     claim(paths, force=force)
-    for path, text in paths.items():
-        write_atomically(path, text.rstrip() + "\n" + template_mark(text))
+    with together():
+        for path, text in paths.items():
+            write_atomically(path, text.rstrip() + "\n" + template_mark(text))
     return tuple(paths)
 
 

@@ -60,6 +60,8 @@ def spectrum_figure(scores: ProfileScores) -> Figure:
     return figure
 
 
+NAMED_BLOCKS = 3
+"""Blocks that a verdict names."""
 GOOD_RATIO, BAD_RATIO = 1.2, 2.0
 """Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
 
@@ -70,7 +72,7 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
         *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
-        f"verdict: {scores.verdict.in_words()}",
+        f"verdict: {verdict_in_words(scores)}",
         scores.verdict.alarm_words(),
         f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
         *realism_lines(scores.realism),
@@ -90,8 +92,8 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
     for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
         lines.append(
-            f"near a marking, {name}: {100 * each.share_near:.2f} % of the time, "
-            f"{each.excursions_per_hour:.1f} times an hour"
+            f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, offsets up to "
+            f"{each.largest:.2f} m"
         )
     return "\n".join(lines)
 
@@ -104,14 +106,15 @@ FITTED_NOTE = (
 def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> dict[str, Any]:
     """The scores and what is needed to get them again, as plain values."""
     block, ratio = worst_block(scores)
-    worst = {"worst": {"block": block, "ratio": round(ratio, 3)}}
-    return {**worst, **scores_to_dict(scores), "provenance": _provenance(scores, profile, inputs)}
+    values = {"worst": {"block": block, "ratio": round(ratio, 3)}, **scores_to_dict(scores)}
+    values["verdict"]["words"] = verdict_in_words(scores)
+    return {**values, "provenance": _provenance(scores, profile, inputs)}
 
 
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
     page = Page(f"Evaluation of {scores.profile}")
-    verdict = scores.verdict.in_words()
+    verdict = verdict_in_words(scores)
     page.lead(
         f"{verdict[:1].upper()}{verdict[1:]}. {scores.verdict.alarm_words().capitalize()}.",
         f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), beside offsets sampled from "
@@ -176,7 +179,6 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         [
             {
                 "drives": name,
-                "time near a marking [%]": 100.0 * each.share_near,
                 "excursions [1/h]": each.excursions_per_hour,
                 "largest offset [m]": each.largest,
             }
@@ -281,6 +283,18 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
     blocks = blocks_of(scores)
     worst = max(blocks, key=blocks.__getitem__)
     return worst, blocks[worst]
+
+
+def verdict_in_words(scores: ProfileScores) -> str:
+    """One line from all that is compared: power by frequency, and every block that is far from real drivers."""
+    far = {name: ratio for name, ratio in blocks_of(scores).items() if ratio >= BAD_RATIO}
+    if not far:
+        return scores.verdict.in_words()
+    worst = sorted(far, key=far.__getitem__, reverse=True)
+    listed = ", ".join(f"{name} ({far[name]:.2f})" for name in worst[:NAMED_BLOCKS])
+    more = f" and {len(far) - NAMED_BLOCKS} more" if len(far) > NAMED_BLOCKS else ""
+    what = f"{BAD_RATIO:g} times as far as real drivers are from each other, or more, in"
+    return f"{scores.verdict.in_words()}; not like them: {what} {listed}{more}"
 
 
 def _tone(ratio: float) -> Tone:

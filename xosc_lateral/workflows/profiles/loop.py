@@ -178,14 +178,15 @@ class ClosedLoop(Result):
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
-        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.files.atomic import together, write_atomically
         from xosc_lateral.files.json_text import canonical_json
         from xosc_lateral.workflows.profiles.loop_page import loop_page
 
         output = output_folder(folder)
         claim(self.report_files(output), self._given.files, force=force)
-        write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(output / "report.html", loop_page(self._result, self._given.files, self.proofs))
+        with together():
+            write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
+            write_atomically(output / "report.html", loop_page(self._result, self._given.files, self.proofs))
         return output
 
     @staticmethod

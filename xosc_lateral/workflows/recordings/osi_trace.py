@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
@@ -14,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.apart import apart
 from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
-from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.files.tables import foreign_errors, read_parquet
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
 from xosc_lateral.world.motion.nominal import axes
 
@@ -80,6 +82,7 @@ class Trace:
 
     def _of_mcap(self, channel: str | None) -> Any:
         utilities = osi("osi_utilities")
+        _refuse_unpacking(self.path)
         reader = utilities.MultiTraceReader()
         if not reader.open(self.path):
             raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
@@ -122,16 +125,11 @@ class Trace:
 
     def _of_rows(self) -> Iterator[Any]:
         """Ground truths of omega-prime's Parquet, whose lanes or road are in its metadata."""
-        import pyarrow.parquet as pq
-
         path, ground_truth = self.path, osi("osi3.osi_groundtruth_pb2").GroundTruth
-        with open_source(path) as source, foreign_errors(path, "can't be read as Parquet"):
-            file = pq.ParquetFile(source.file)
-            missing = [name for name in ROW_COLUMNS if name not in file.schema_arrow.names]
-            if missing:
-                raise FormatError(f"no column {missing[0]!r}: not a recording of omega-prime", path=path)
-            about = file.schema_arrow.metadata or {}
-            rows = file.read(list(ROW_COLUMNS)).sort_by([("total_nanos", "ascending"), ("idx", "ascending")])
+        with foreign_errors(path, "can't be read as Parquet"):
+            rows = read_parquet(path, ROW_COLUMNS, "not a recording of omega-prime")
+            about = rows.schema.metadata or {}
+            rows = rows.sort_by([("total_nanos", "ascending"), ("idx", "ascending")])
         self.opendrive = about.get(b"xodr")
         with foreign_errors(path, "can't be read as a recording of omega-prime"):
             lanes = ground_truth()
@@ -151,6 +149,26 @@ class Trace:
                 for row in present:
                     _fill(message.moving_object.add(), row)
             yield message
+
+
+CHUNK, CHUNK_HEAD = 6, struct.Struct("<QQQII")
+"""Opcode of an MCAP file's packed chunks; first and last time, unpacked size, checksum, length of the packer's name."""
+
+
+def _refuse_unpacking(path: Path) -> None:
+    """Refuse a trace with a chunk that says it is too large, before anything is unpacked; chunks come one by one."""
+    with open_source(path) as source:
+        place = 8  # after the magic number
+        while source.file.seek(place) == place and len(head := source.file.read(9)) == 9:
+            size = int.from_bytes(head[1:], "little")
+            if head[0] == CHUNK and len(stated := source.file.read(CHUNK_HEAD.size)) == CHUNK_HEAD.size:
+                *_, unpacked, _, named = CHUNK_HEAD.unpack(stated)
+                packer = source.file.read(min(named, size))
+                packed = source.file.read(8 + 18)[8:]  # a frame's header has 18 bytes at most
+                if packer == b"zstd" and len(packed) > 4:
+                    unpacked = max(unpacked, osi("zstandard").frame_content_size(packed))  # what is reserved for it
+                replace(source, size=size).unpacked(unpacked)
+            place += 9 + size
 
 
 def _fill(thing: Any, row: dict[str, Any]) -> None:
@@ -191,6 +209,7 @@ class Recorded:
     opendrive: bytes | None = None
 
 
+@apart
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
     """Read a trace, message by message. Raises `FormatError`, `NotEnoughDataError`."""
     with Trace(path, channel) as trace:

@@ -88,7 +88,7 @@ class Reconstruction(Result):
         -------
         tuple of Path
         """
-        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.files.atomic import together, write_atomically
         from xosc_lateral.files.json_text import canonical_json
         from xosc_lateral.workflows.recordings.page import page_of
 
@@ -104,9 +104,10 @@ class Reconstruction(Result):
         kept = {path.resolve() for path in self.traffic.sources if path.exists() and (place / path.name).exists()}
         new = {path: data for path, data in paths.items() if path.resolve() not in kept}  # a road that lies there stays
         claim([*new, table], self.traffic.sources, force=force)
-        for path, data in new.items():
-            write_atomically(path, data)
-        drivers_table(self, table)
+        with together():
+            for path, data in new.items():
+                write_atomically(path, data)
+            drivers_table(self, table)
         self.outputs = (*paths, table)
         return self.outputs
 

@@ -137,7 +137,7 @@ class Simulation:
         """Somebody asks since when an entity has stood, been at the end of its road, or off it."""
         self.derives_off_road = False
         self.when_built: list[Callable[[Any], None]] = []
-        """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
+        """Called with all elements, by `last_name`, once the storyboard stands: conditions on them look for theirs."""
         self.notes: list[Note] = []
         self.doubts: list[Note] = []
         self.routes: list[FollowedRoute] = []

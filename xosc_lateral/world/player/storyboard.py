@@ -24,6 +24,11 @@ Watcher = Callable[[State, State | None], None]
 """Told of a change: the state, and the transition that led to it (none to standby)."""
 
 
+def last_name(reference: str) -> str:
+    """What a reference to an element, or the element's name, ends with."""
+    return reference.rpartition("::")[2]
+
+
 @dataclass(eq=False)
 class StoryboardElement:
     """One element of the tree."""

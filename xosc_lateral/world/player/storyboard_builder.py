@@ -26,6 +26,7 @@ from xosc_lateral.world.player.storyboard import (
     RunningCondition,
     RunningTrigger,
     StoryboardElement,
+    last_name,
 )
 from xosc_lateral.world.scenario import scenario as read
 from xosc_lateral.world.scenario.dependence import entity_references
@@ -47,8 +48,11 @@ def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> Sto
         for story in storyboard.stories
     ]
     root = StoryboardElement("", None, stories, stop_trigger=_trigger(storyboard.stop_trigger, simulation))
+    named: dict[str, list[StoryboardElement]] = {}
+    for element in root.walk():
+        named.setdefault(last_name(element.name), []).append(element)
     for look in simulation.when_built:
-        look(root)
+        look(named)
     if storyboard.stop_trigger is None:
         simulation.note("has no stop trigger: the run ends at the time limit", storyboard.place)
     return root

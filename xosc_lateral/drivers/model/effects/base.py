@@ -30,6 +30,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.limits import COURSE, RESPONSE
 from xosc_lateral.base.segment import FADES
 from xosc_lateral.drivers.model.effects.response import Response, ResponseState, respond
 from xosc_lateral.drivers.model.records import Record, kebab, set_once
@@ -168,6 +169,10 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         set_once(self, course=tuple((float(late), float(weight)) for late, weight in self.course))
         if not np.isfinite(np.asarray(self.course)).all():
             raise DriverProfileError(f"effect {self.kind}: course {self.course} has a number that is not finite")
+        latest = max(abs(self.lag_s), self.response_s, *(abs(self.lag_s + late) for late, _ in self.course))
+        for limit, value in ((RESPONSE, latest), (COURSE, len(self.course))):
+            if value > limit.value:
+                raise DriverProfileError(f"effect {self.kind}: {limit.refusal(value)}")
         ranges = tuple((float(low), float(high)) for low, high in self.response_range)
         set_once(self, response_range=ranges)
         if ranges and (

@@ -18,6 +18,7 @@ import numpy as np
 from lxml import etree
 from msgspec import Struct
 
+from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -95,7 +96,7 @@ class _Acts:
     """The acts of one chain: one, or several after an action that may run again."""
 
     def __init__(self, story: etree._Element, chain: OffsetChain, draft: Draft, lateral: LateralActions) -> None:
-        self._story, self._chain, self._version = story, chain, draft.version
+        self._story, self._chain, self._version, self._notes = story, chain, draft.version, draft.notes
         self._items = lateral.by_entity.get(chain.entity, ())
         self._changes_speed = chain.entity in lateral.changing_speed
         self._moving_speed = _moving_speed(draft.motion, chain)
@@ -105,7 +106,11 @@ class _Acts:
         """Add them to the story."""
         item = next((one for one in self._items if one.path == self._chain.after), None)
         before: str | None = None
-        for _ in range(1 if item is None or not item.repeats else self._runs + SPARE_ACTS):
+        if self._runs > REPEATED_RUNS.value:
+            what = f"{' / '.join(self._chain.after or ())}: {REPEATED_RUNS.refusal(self._runs)}"
+            self._notes.append(f"'{self._chain.entity}' has no offsets after more of them; {what}")
+        runs = min(self._runs, int(REPEATED_RUNS.value)) + SPARE_ACTS
+        for _ in range(1 if item is None or not item.repeats else runs):
             act = build.sub(self._story, "Act", name=f"{CHAIN_NAME} {len(self._story) + 1}")
             name = str(act.get("name"))
             path = None if self._chain.path is None else self._add_path(act, name, self._chain.path)

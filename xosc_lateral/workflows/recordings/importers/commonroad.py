@@ -18,6 +18,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.files.apart import apart
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
@@ -50,6 +51,7 @@ def import_commonroad(sources: Path | Sequence[Path], settings: CutSettings = DE
     return import_each(paths_of(sources), read)
 
 
+@apart
 def read_obstacles(path: Path, label: str) -> tuple[Tracks, list[_Lanelet], LaneGraph, str]:
     """All obstacles that move along a recorded trajectory, lanes, and the scenario's id."""
     scenario = _opened(path)

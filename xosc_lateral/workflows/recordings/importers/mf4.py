@@ -15,9 +15,10 @@ from __future__ import annotations
 
 import gc
 import io
+import re
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -35,10 +36,12 @@ from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP
 from xosc_lateral.drivers.drives.resampling import average, resample
+from xosc_lateral.files.apart import apart
 from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle
+from xosc_lateral.files.formula import FormulaError, evaluate
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
-from xosc_lateral.files.source import open_source
+from xosc_lateral.files.source import Source, open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
@@ -115,8 +118,7 @@ def import_mf4(
     tables, notes = list[pd.DataFrame](), list[str]()
     units: dict[str, set[str]] = {name: set() for name in wanted}  # that columns were read in; logs may differ
     for file, label in zip(files, file_labels(files), strict=True):
-        with _opened(file) as log:
-            signals = {name: _read_channel(log, name, source, file, saved.missing) for name, source in wanted.items()}
+        signals = read_channels(file, wanted, saved.missing)
         for name, channel in signals.items():
             units[name].add(channel.unit)
             notes += channel.notes
@@ -134,14 +136,29 @@ def import_mf4(
 
 def channels_wanted(source: Path) -> str:
     """What the channel map has to name, and the channels that there are to choose from: for who has no map yet."""
-    with _opened(source) as log:
-        names = _names(log)
+    names = channel_names(source)
     listed = ", ".join(names[:LISTED_CHANNELS]) + (", ..." if len(names) > LISTED_CHANNELS else "")
     return (
         "the channel map needs --map offset=CHANNEL[:UNIT] and --map lane_width=CHANNEL[:UNIT], or "
         "--map distance_left=CHANNEL[:UNIT] and --map distance_right=CHANNEL[:UNIT]; "
         f"{source.name} has {len(names)} channels: {listed}"
     )
+
+
+@apart
+def channel_names(source: Path) -> list[str]:
+    """Of all channels of a log. Raises `FormatError`."""
+    with _opened(source) as log:
+        return _names(log)
+
+
+@apart
+def read_channels(
+    source: Path, wanted: Mapping[str, ColumnSource], missing: Sequence[float | str] | None
+) -> dict[str, Channel]:
+    """Channels of a log, by the columns that they become. Raises `FormatError`."""
+    with _opened(source) as log:
+        return {name: _read_channel(log, name, channel, source, missing) for name, channel in wanted.items()}
 
 
 def _names(log: Any) -> list[str]:
@@ -156,13 +173,57 @@ def _opened(source: Path) -> Iterator[Any]:
         from asammdf import MDF
     except ImportError as error:
         raise FormatError("reading MDF needs asammdf: pip install 'xosc-lateral[mdf]'", path=source) from error
+    _compute_formulas()
     with open_source(source) as opened, foreign_errors(source, _NO_MDF):
+        _refuse_unpacking(opened)
         try:
             log = MDF(opened.file if isinstance(opened.file, io.BytesIO) else source)
         except Exception as error:
             raise FormatError(f"{_NO_MDF}: {_reason(error)}", path=source) from None
         with log:
             yield log
+
+
+_PACKED = re.compile(rb"##DZ.{4}(.{8})\0{8}.{8}(.{8})(.{8})", re.DOTALL)
+"""Header of a packed block: its size, no links, kind, unpacked and packed size (ASAM MDF 4.2, ##DZ)."""
+_PACKED_HEAD = 48
+_SCANNED = 1 << 24
+
+
+def _refuse_unpacking(opened: Source) -> None:
+    """Refuse a log whose packed blocks say that they are too large, before anything is unpacked."""
+    size, rest = 0, b""
+    while chunk := opened.file.read(_SCANNED):
+        text = rest + chunk
+        for match in _PACKED.finditer(text):
+            block, unpacked, packed = (int.from_bytes(part, "little") for part in match.groups())
+            if packed <= block <= opened.size:  # else these are values that look like a header
+                size += unpacked
+        rest = text[-_PACKED_HEAD + 1 :]
+    opened.unpacked(size)
+    opened.file.seek(0)
+
+
+def _compute_formulas() -> None:
+    """Let our own parser compute what a log states as formulas; asammdf would leave or run what it does not know."""
+    from asammdf.blocks import v2_v3_blocks, v2_v3_constants, v4_blocks, v4_constants
+
+    for blocks, kind in (
+        (v4_blocks, v4_constants.CONVERSION_TYPE_ALG),
+        (v2_v3_blocks, v2_v3_constants.CONVERSION_TYPE_FORMULA),
+    ):
+        conversion: Any = blocks.ChannelConversion
+        if getattr(conversion.convert, "kind", None) is not None:
+            continue
+
+        def convert(
+            self: Any, values: Any, *more: Any, kind: int = kind, its: Any = conversion.convert, **said: Any
+        ) -> Any:
+            computed = self.conversion_type == kind
+            return evaluate(str(self.formula), values) if computed else its(self, values, *more, **said)
+
+        convert.kind = kind  # type: ignore[attr-defined]
+        conversion.convert = convert
 
 
 def _reason(error: Exception) -> str:
@@ -189,7 +250,10 @@ def _read_channel(
     places = [place for place in log.channels_db.get(named, ()) if only in ("", str(place[0]))]
     if not places:
         raise FormatError(f"no channel {wanted.column}{_alike(log, named)}", path=source, element=name)
-    signals = [log.get(group=group, index=index) for group, index in places]
+    try:
+        signals = [log.get(group=group, index=index) for group, index in places]
+    except FormulaError as error:
+        raise wrong(f" is computed by a formula: {error}") from error
     notes = _of_one_name(signals, [group for group, _ in places], name, named, wrong)
     signal = max(signals, key=lambda signal: len(signal.samples))
     samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from xosc_lateral.world.player.simulation import Simulation, holds
-from xosc_lateral.world.player.storyboard import Check, Checks, StoryboardElement, Watch
+from xosc_lateral.world.player.storyboard import Check, Checks, StoryboardElement, Watch, last_name
 from xosc_lateral.world.scenario import conditions
 from xosc_lateral.world.scenario.enums import StoryboardElementState as State
 
@@ -74,10 +76,10 @@ class StateWatch(Watch):
         self._changes: list[tuple[State, State | None]] = []
         self._last: State | None = None
 
-    def find(self, root: StoryboardElement) -> None:
-        """Look for the element: the first whose path ends in the reference."""
+    def find(self, named: Mapping[str, Sequence[StoryboardElement]]) -> None:
+        """Look for the element: the first whose path ends in the reference; `named`: by `last_name`."""
         kind, reference = self._content.element_type, self._content.element_ref
-        for element in root.walk():
+        for element in named.get(last_name(reference), ()):
             if (
                 element.kind is kind
                 and len(reference) >= len(element.name)
