@@ -59,11 +59,11 @@ _NEWER = {
 
 def remark_newer(root: XmlElement) -> list[Unsupported]:
     """One remark for each kind of what version 1.4 has and nobody reads, at its first place."""
-    found: dict[str, etree._Element] = {}
+    first_uses: dict[str, etree._Element] = {}
     for item in root.xml.iter("{*}*"):
         for name in {local_name(item), *(str(name) for name in item.attrib if name == "layer")} & _NEWER.keys():
-            found.setdefault(name, item)
-    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in found.items())
+            first_uses.setdefault(name, item)
+    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in first_uses.items())
     return [Unsupported(place.element, place, f"{name} {_NEWER[name]}") for name, place in places]
 
 

@@ -85,8 +85,8 @@ def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played
     played = Played(
         loaded.scenario, loaded.network, play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
     )
-    motion, found = played.motion, doubts_about(played.motion, played.network, played.trailers)
-    return replace(played, motion=replace(motion, notes=motion.notes + found, doubts=motion.doubts + found))
+    motion, doubts = played.motion, doubts_about(played.motion, played.network, played.trailers)
+    return replace(played, motion=replace(motion, notes=motion.notes + doubts, doubts=motion.doubts + doubts))
 
 
 def road_network(path: Path) -> RoadNetwork:

@@ -32,16 +32,16 @@ _GUIDED = np.uint8(Activity.LATERAL | Activity.TRAJECTORY | Activity.TELEPORTED)
 
 def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str, str]) -> tuple[Note, ...]:
     """Notes with file, line, entity and time; `trailers`: who is pulled from the start, and by whom."""
-    found: list[Note] = []
+    notes: list[Note] = []
     for entity in motion.entities:
         if entity.name not in trailers:
-            found += _jumps(entity)
+            notes += _jumps(entity)
         if entity.entity.is_vehicle:
-            found += _lanes_for_nobody(entity, network)
+            notes += _lanes_for_nobody(entity, network)
     for route in motion.routes:
-        found += _off_route(route, next(each for each in motion.entities if each.name == route.entity), motion, network)
-    found += _overlaps(motion, trailers)
-    return tuple(found)
+        notes += _off_route(route, next(each for each in motion.entities if each.name == route.entity), motion, network)
+    notes += _overlaps(motion, trailers)
+    return tuple(notes)
 
 
 def _note(what: str, place: Place) -> Note:
@@ -50,9 +50,9 @@ def _note(what: str, place: Place) -> Note:
 
 def _jumps(entity: EntityMotion) -> Iterator[Note]:
     """The first jump that nobody asked for, and how many there are."""
-    found = leaps(entity)
-    if found:
-        (time, length), more = found[0], f" ({len(found)} times in all)" if len(found) > 1 else ""
+    jumps = leaps(entity)
+    if jumps:
+        (time, length), more = jumps[0], f" ({len(jumps)} times in all)" if len(jumps) > 1 else ""
         why = "further than its speed explains: the lane that it follows ends, or its road has a gap"
         yield _note(f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", entity.entity.place)
 
@@ -97,8 +97,8 @@ def _type_at(entity: EntityMotion, network: RoadNetwork, row: int) -> str:
     road, lane = int(entity.road[row]), int(entity.lane[row])
     if road < 0 or lane == 0:
         return ""
-    found = network.roads[road].section_at(float(entity.s[row])).by_id.get(lane)
-    return "" if found is None else found.type
+    described = network.roads[road].section_at(float(entity.s[row])).by_id.get(lane)
+    return "" if described is None else described.type
 
 
 def _off_route(

@@ -71,9 +71,9 @@ class Links:
             for target in _lanes_beyond(here, lane_here, way, s, joint, _named_by(lane_here, way), unsaid):
                 yield LaneLink(road, target, s, way)
             return
-        found = False
+        is_listed = False
         for other, contact, pairs, is_back in self._joints(road, way) if lane else ():
-            if is_back and found:
+            if is_back and is_listed:
                 return
             named = _named_by(lane_here, way) if pairs is None else [to for source, to in pairs if source == lane]
             if pairs and not named:
@@ -81,7 +81,7 @@ class Links:
             there, (s, entry) = self.roads[other], (0.0, 1) if contact == "start" else (self.roads[other].length, -1)
             joint = _Joint(there, there.sections[0 if entry > 0 else -1], s, entry)
             for target in _lanes_beyond(here, lane_here, way, here.length if way > 0 else 0.0, joint, named):
-                found = not is_back
+                is_listed = not is_back
                 yield LaneLink(other, target, s, entry)
 
     def _joints(self, road: int, way: int) -> Iterator[tuple[int, str, Pairs | None, bool]]:
@@ -115,19 +115,19 @@ class Links:
     ) -> LaneLink | None:
         """Where a lane ends: the lane of these types beyond that is nearest to t, of two the one of its id. [m]
 
-        None: the road itself ends there, or a junction begins, or nothing beyond is of these types.
+        Within a road it is one driven the same way; on another road, as in the reference player, any. None: the road
+        itself ends there, or a junction begins, or nothing beyond is of these types.
         """
         here = self.roads[road]
-        other, entry, lane_here = road, way, here.sections[section].by_id[lane]
+        other, entry, direction = road, way, here.sections[section].by_id[lane].direction
         s = here.sections[section].end if way > 0 else _just_before(here.sections[section].start)
         if not self._is_inside(road, section + way):
             link = here.successor if way > 0 else here.predecessor
             if link is None or link.element_type != "road" or link.element_id not in self._index:
                 return None
-            other = self._index[link.element_id]
+            other, direction = self._index[link.element_id], 0
             entry = 1 if link.contact != "end" else -1
             s = 0.0 if entry > 0 else self.roads[other].length
-        direction = lane_here.direction * way * entry
         beyond = lane_at(
             self.roads[other], other, s, t if entry == way else -t, lane_types, prefer=lane, direction=direction
         )

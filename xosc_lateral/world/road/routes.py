@@ -36,18 +36,22 @@ class Routes(Links):
         if road == target:
             best = RoadPath((target_s - s) * direction, 1 if target_s >= s else -1, ())
         for way in (1, -1):
-            found = _shortest(
+            room = self.roads[road].length - s if way > 0 else s
+            reach = min(limit, abs(best.ds) if best is not None else inf)
+            if room > reach:
+                continue
+            path = _shortest_path(
                 self.next_roads(road, way),
-                self.roads[road].length - s if way > 0 else s,
+                room,
                 lambda end: self.next_roads(*end),
                 lambda end: self.roads[end[0]].length,
                 lambda end: (
                     None if end[0] != target else target_s if end[1] > 0 else self.roads[target].length - target_s
                 ),
-                min(limit, abs(best.ds) if best is not None else inf),
+                reach,
             )
-            if found is not None and (best is None or found[0] < abs(best.ds)):
-                best = RoadPath(found[0] * way * direction, way, found[1])
+            if path is not None and (best is None or path[0] < abs(best.ds)):
+                best = RoadPath(path[0] * way * direction, way, path[1])
         return best if best is not None and abs(best.ds) <= limit else None
 
     def route(
@@ -87,11 +91,11 @@ class Routes(Links):
         goal = target, self.roads[target].section_number(target_s), target_s
         for own_lane in (lane, None):
             begin = _Stretch(road, self.roads[road].section_number(s), own_lane, way)
-            found = self._shortest_way(begin, s, goal)
-            if found is not None and own_lane is not None and found[-1].lane != wanted:
-                found = self._shortest_way(begin, s, goal, wanted, self._outside_junctions(found)) or found
-            if found is not None:
-                return self._steps_of(found, s, target_s, 0 if found[-1].lane == wanted else wanted)
+            path = self._shortest_way(begin, s, goal)
+            if path is not None and own_lane is not None and path[-1].lane != wanted:
+                path = self._shortest_way(begin, s, goal, wanted, self._outside_junctions(path)) or path
+            if path is not None:
+                return self._steps_of(path, s, target_s, 0 if path[-1].lane == wanted else wanted)
         return None
 
     def _outside_junctions(self, way: _Way) -> list[int]:
@@ -128,8 +132,8 @@ class Routes(Links):
         if arrival(begin) is not None and (target_s - s) * begin.way >= 0.0:
             return (begin,)
         room = abs(edge(begin, begin.way) - s)
-        found = _shortest(onward(begin), room, onward, lambda on: abs(edge(on, 1) - edge(on, -1)), arrival)
-        return None if found is None else (begin, *found[1])
+        path = _shortest_path(onward(begin), room, onward, lambda on: abs(edge(on, 1) - edge(on, -1)), arrival)
+        return None if path is None else (begin, *path[1])
 
     def _drivable(self, on: _Stretch) -> Iterator[_Stretch]:
         """What a lane leads to, ended ones included; without a lane, what any driving lane of its way does."""
@@ -181,7 +185,7 @@ class _Stretch(NamedTuple):
 _Way = tuple[_Stretch, ...]
 
 
-def _shortest(
+def _shortest_path(
     first: Iterable[_Node],
     room: float,
     onward: Callable[[_Node], Iterable[_Node]],
