@@ -15,6 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.own_clock import clock_rate, own_time, way_of
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
@@ -23,6 +24,7 @@ from xosc_lateral.drivers.model.sampling import Responses, responses_to
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.context import Surroundings
 
@@ -48,7 +50,8 @@ class SeenSegment(NamedTuple):
     """A road-following segment as its driver sees it, or several and what lies between and beside them."""
 
     spans: tuple[SegmentSpan, ...]  # one after another; see `movement_runs`
-    knots: IntArray  # rows of the motion that are sampled, shape (n,)
+    knots: IntArray  # rows of the motion that are sampled, shape (n,); where it is slow, those nearest to it
+    distance: FloatArray  # driven there [m]
     segment: Segment  # in a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1
     side: float
     responses: Responses  # see `responses_to`
@@ -79,16 +82,20 @@ def seen_by(
     motion, network = surroundings.motion, surroundings.network
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
+    driven = distance_driven(entity)
     segments: list[SeenSegment] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for spans in runs:
-        knots = np.arange(spans[0].first, spans[-1].last + 1, every)
-        if len(knots) < 2:
+        rows = np.arange(spans[0].first, spans[-1].last + 1, every)
+        if len(rows) < 2:
             continue
+        knots, distance = _knots(entity, driven, slice(spans[0].first, spans[-1].last + 1), every)
         for span in spans:
             if span.is_road_following:
                 _refuse_no_width(entity, span, network)
-        segment = _segment(surroundings, index, knots, every, contexts)
+        segment = _segment(surroundings, index, rows, every, contexts)
+        if not np.array_equal(rows, knots):
+            segment = _on_own_clock(segment, np.minimum((knots - rows[0]) // every, len(rows) - 1))
         if neighbours is Neighbours.NONE:
             beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
             emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
@@ -99,8 +106,28 @@ def seen_by(
         responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         segment, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
-        segments.append(SeenSegment(spans, knots, segment, side, responses_to(segment, driver)))
+        segments.append(SeenSegment(spans, knots, distance, segment, side, responses_to(segment, driver)))
     return Seen(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+
+
+def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) -> tuple[IntArray, FloatArray]:
+    """Rows that are sampled, and the distance driven there [m]: a step apart on the driver's clock (`own_clock`).
+
+    Below 40 km/h these are further apart in time, and those between rows are named by the nearest; the last then lies
+    behind the end, where the car would go on as it does there.
+    """
+    time, speed = entity.time[rows], entity.speed[rows]
+    if (clock_rate(speed) == 1.0).all():
+        knots = np.arange(rows.start, rows.stop, every)
+        return knots, driven[knots]
+    own, step = own_time(time, speed), every * float(time[1] - time[0])
+    ticks = step * np.arange(max(np.ceil(own[-1] / step - 1e-9), 1.0) + 1.0)
+    moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)  # of the rows in one place the first
+    distance = np.interp(ticks, own[moved], driven[rows][moved])
+    distance[-1] += max(ticks[-1] - own[-1], 0.0) * way_of(float(speed[-1]))
+    nearest = np.rint(np.interp(ticks, own[moved], moved)).astype(np.int64)
+    nearest[-1] = len(own) - 1
+    return rows.start + nearest, distance
 
 
 def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
@@ -137,6 +164,17 @@ def _segment(surroundings: Surroundings, index: int, knots: IntArray, every: int
         context[name] = np.interp(entity.time[grid], time, values)
     lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))
     return Segment(entity.time[grid], lane_width, context["speed"], context, before, after)
+
+
+def _on_own_clock(segment: Segment, rows: IntArray) -> Segment:
+    """The segment with these rows of its inside [steps] a step apart in time."""
+    before = np.arange(segment.before)
+    taken = np.concatenate((before, segment.before + rows, np.arange(segment.inside.stop, len(segment))))
+    time = segment.time[0] + (segment.time[1] - segment.time[0]) * np.arange(len(taken))
+    context = {name: values[taken] for name, values in segment.context.items()}
+    return replace(
+        segment, time=time, lane_width=segment.lane_width[taken], speed=segment.speed[taken], context=context
+    )
 
 
 def _filled(values: FloatArray, inside: slice) -> FloatArray:
