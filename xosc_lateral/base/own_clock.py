@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 
 HALF_RATE_SPEED = 1.0
@@ -44,6 +44,18 @@ def own_time(time: FloatArray, speed: FloatArray) -> FloatArray:
     """The driver's time since the first row, shape (n,), from rows of time [s] and speed [m/s], shape (n,). [s]"""
     rate = clock_rate(speed)
     return np.concatenate(([0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(time))))
+
+
+def ticks_of(time: FloatArray, speed: FloatArray, step: float) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Own time of each row, shape (n,); own times a step [s] apart from the first row to behind the last, at least two;
+    and the rows that are nearest to these. From rows of time [s] and speed [m/s], shape (n,).
+    """
+    own = own_time(time, speed)
+    ticks = step * np.arange(max(np.ceil(own[-1] / step - 1e-9), 1.0) + 1.0)
+    moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)  # of the rows in one place the first
+    nearest = np.rint(np.interp(ticks, own[moved], moved)).astype(np.int64)
+    nearest[-1] = len(own) - 1
+    return own, ticks, nearest
 
 
 def within_heading(offset: FloatArray, distance: FloatArray) -> FloatArray:

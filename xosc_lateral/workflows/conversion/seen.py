@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.own_clock import clock_rate, own_time, way_of
+from xosc_lateral.base.own_clock import clock_rate, ticks_of, way_of
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
@@ -95,7 +95,7 @@ def seen_by(
                 _refuse_no_width(entity, span, network)
         segment = _segment(surroundings, index, rows, every, contexts)
         if not np.array_equal(rows, knots):
-            segment = _on_own_clock(segment, np.minimum((knots - rows[0]) // every, len(rows) - 1))
+            segment = segment.at(np.minimum((knots - rows[0]) // every, len(rows) - 1))
         if neighbours is Neighbours.NONE:
             beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
             emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
@@ -120,13 +120,10 @@ def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) ->
     if (clock_rate(speed) == 1.0).all():
         knots = np.arange(rows.start, rows.stop, every)
         return knots, driven[knots]
-    own, step = own_time(time, speed), every * float(time[1] - time[0])
-    ticks = step * np.arange(max(np.ceil(own[-1] / step - 1e-9), 1.0) + 1.0)
-    moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)  # of the rows in one place the first
+    own, ticks, nearest = ticks_of(time, speed, every * float(time[1] - time[0]))
+    moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)
     distance = np.interp(ticks, own[moved], driven[rows][moved])
     distance[-1] += max(ticks[-1] - own[-1], 0.0) * way_of(float(speed[-1]))
-    nearest = np.rint(np.interp(ticks, own[moved], moved)).astype(np.int64)
-    nearest[-1] = len(own) - 1
     return rows.start + nearest, distance
 
 
@@ -164,17 +161,6 @@ def _segment(surroundings: Surroundings, index: int, knots: IntArray, every: int
         context[name] = np.interp(entity.time[grid], time, values)
     lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))
     return Segment(entity.time[grid], lane_width, context["speed"], context, before, after)
-
-
-def _on_own_clock(segment: Segment, rows: IntArray) -> Segment:
-    """The segment with these rows of its inside [steps] a step apart in time."""
-    before = np.arange(segment.before)
-    taken = np.concatenate((before, segment.before + rows, np.arange(segment.inside.stop, len(segment))))
-    time = segment.time[0] + (segment.time[1] - segment.time[0]) * np.arange(len(taken))
-    context = {name: values[taken] for name, values in segment.context.items()}
-    return replace(
-        segment, time=time, lane_width=segment.lane_width[taken], speed=segment.speed[taken], context=context
-    )
 
 
 def _filled(values: FloatArray, inside: slice) -> FloatArray:
