@@ -30,7 +30,8 @@ def test_its_time_is_the_integral_and_the_way_of_its_second_the_speed_over_its_r
     factor = 1.0 + 1.0 / MINIMUM_SPEED
     assert own_time(time, speed)[-1] == pytest.approx(10.0 * factor * (10.0 - np.log(11.0)), rel=1e-6)
     for pace in (0.01, 1.0, 7.0, 11.0, 20.0):
-        assert way_of(pace) == pytest.approx(pace / clock_rate(np.array([pace]))[0])
+        at = np.array([pace])
+        assert way_of(at) == pytest.approx(at / clock_rate(at))
 
 
 def test_a_path_that_turns_too_far_is_led_through_the_middle_and_another_is_left_alone() -> None:

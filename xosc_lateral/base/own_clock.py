@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 
 HALF_RATE_SPEED = 1.0
@@ -27,17 +27,22 @@ SPEED_SLACK = 1e-6
 """40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [-]"""
 
 
+def is_slow(speed: FloatArray) -> BoolArray:
+    """Whether below 40 km/h, any shape. [m/s]"""
+    return np.asarray(np.abs(speed) < MINIMUM_SPEED * (1.0 - SPEED_SLACK))
+
+
 def clock_rate(speed: FloatArray) -> FloatArray:
     """Seconds of the driver's clock per second at a speed [m/s] in either direction, any shape, 0 to 1. [-]"""
     pace = np.abs(speed)
     rate = pace * (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED) / (pace + HALF_RATE_SPEED)
-    return np.where(pace >= MINIMUM_SPEED * (1.0 - SPEED_SLACK), 1.0, np.minimum(rate, 1.0))
+    return np.where(is_slow(speed), np.minimum(rate, 1.0), 1.0)
 
 
-def way_of(speed: float) -> float:
-    """Distance driven in a second of the driver's clock at a speed [m/s]. [m]"""
-    pace = abs(speed)
-    return max(pace, (pace + HALF_RATE_SPEED) / (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED))
+def way_of(speed: FloatArray) -> FloatArray:
+    """Distance driven in a second of the driver's clock at a speed [m/s], any shape; 0.9 m as it comes to rest. [m]"""
+    pace = np.abs(speed)
+    return np.maximum(pace, (pace + HALF_RATE_SPEED) / (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED))
 
 
 def own_time(time: FloatArray, speed: FloatArray) -> FloatArray:

@@ -74,8 +74,11 @@ class ResponseStream:
         if not there.any():  # who comes next meets nobody's past
             self.restore(ResponseStreamState(ResponseState()))
 
-    def see(self, context: Mapping[str, FloatArray], *, before: bool = False) -> None:
-        """One more row of context, shape (n,) each; what responds to a row before the drive is not given."""
+    def see(self, context: Mapping[str, FloatArray], *, before: bool = False, whose: BoolArray | None = None) -> None:
+        """One more row of context, shape (n,) each; what responds to a row before the drive is not given.
+
+        Others than those `whose` row it is, shape (n,), are left where they are; what `next` gives of them is void.
+        """
         row = self.effect.known(context).ravel()
         state, seen = self.state, self.state.response
         if seen.held is not None and (known := seen.held.shape[1]) < len(row):
@@ -84,7 +87,14 @@ class ResponseStream:
             if seen.settled is not None:
                 lags = seen.settled.reshape(-1, known)
                 seen.settled = np.concatenate([lags, np.tile(new, (len(lags), 1))], axis=1).ravel()
+        held, settled = seen.held, seen.settled
         state.ready.extend(self._response.take(row[None, :]))
+        if whose is not None and not whose.all() and held is not None and seen.held is not None:
+            waits = np.repeat(~whose, self._slopes.shape[1])
+            rows = np.maximum(np.arange(len(held) - len(seen.held), len(held)), 0)
+            seen.held = np.where(waits, held[rows], seen.held)
+            if settled is not None and seen.settled is not None:
+                seen.settled = np.where(np.tile(waits, len(settled) // len(waits)), settled, seen.settled)
         if state.drop or before:
             state.drop += before
             dropped = min(state.drop, len(state.ready))
@@ -169,8 +179,10 @@ class OffsetGroup:
             response.keep_present(there)
         self._state = self._state[there]
 
-    def advance(self, context: Mapping[str, FloatArray], width: FloatArray) -> FloatArray:
-        """One model step of everybody.
+    def advance(
+        self, context: Mapping[str, FloatArray], width: FloatArray, whose: BoolArray | None = None
+    ) -> FloatArray:
+        """One model step of everybody, or of those `whose` it is, shape (n,): what is returned of others is void.
 
         Parameters
         ----------
@@ -184,21 +196,22 @@ class OffsetGroup:
         array, shape (n, 6)
             Coefficients in u, from 0 at this moment to 1 at the next, lowest power first, of the offset. [m]
         """
-        self.see(context)
+        self.see(context, whose=whose)
         effects, samples = self._effects(), self._state["samples"]
-        fresh = np.flatnonzero(self._state["row"] == 0)
+        on = np.arange(len(self)) if whose is None else np.flatnonzero(whose)
+        fresh = on[self._state["row"][on] == 0]
         if len(fresh):
             theirs = [terms.rows(fresh) for terms in effects]
             first, second = (self._next(fresh, theirs, width[fresh]) for _ in range(2))
             samples[fresh] = np.stack([np.zeros(len(fresh)), extrapolate(second, first), first, second], axis=1)
-        sample = self._next(np.arange(len(self)), effects, width)
-        samples[:] = np.concatenate([samples[:, 1:], sample[:, None]], axis=1)
+        sample = self._next(on, [terms.rows(on) for terms in effects], width[on])
+        samples[on] = np.concatenate([samples[on, 1:], sample[:, None]], axis=1)
         return np.stack(np.broadcast_arrays(*piece(*samples.T)), axis=1)
 
-    def see(self, context: Mapping[str, FloatArray], *, before: bool = False) -> None:
-        """One more row of context, shape (n,) each: of the drive, or from before it."""
+    def see(self, context: Mapping[str, FloatArray], *, before: bool = False, whose: BoolArray | None = None) -> None:
+        """One more row of context, shape (n,) each: of the drive, or from before it; of all, or of some drivers."""
         for response in self.responses:
-            response.see(context, before=before)
+            response.see(context, before=before, whose=whose)
 
     def sample(self, width: FloatArray, start: float | None = None) -> FloatArray:
         """Everybody's next sample, once what it depends on was seen, shape (n,); the first may be given. [m]"""

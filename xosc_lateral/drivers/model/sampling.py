@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.own_clock import clock_rate, ticks_of, within_heading
+from xosc_lateral.base.own_clock import is_slow, ticks_of, within_heading
 from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
 from xosc_lateral.drivers.model.core.base import CoreStream, Start
 from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms, HiddenEffect
@@ -122,7 +122,7 @@ def sample_offsets(
     """
     sampler, inside = OffsetSampler(profile, seed), segment.inside
     time, speed = segment.time[inside], np.nan_to_num(segment.speed[inside], nan=MINIMUM_SPEED)
-    if len(time) < 2 or (clock_rate(speed) == 1.0).all():
+    if len(time) < 2 or not is_slow(speed).any():
         return sampler.sample(segment, start=start)
     step = float(time[1] - time[0])
     own, _, rows = ticks_of(time, speed, step)

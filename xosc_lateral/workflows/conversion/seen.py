@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.own_clock import clock_rate, ticks_of, way_of
+from xosc_lateral.base.own_clock import is_slow, ticks_of, way_of
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
@@ -117,13 +117,13 @@ def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) ->
     behind the end, where the car would go on as it does there.
     """
     time, speed = entity.time[rows], entity.speed[rows]
-    if (clock_rate(speed) == 1.0).all():
+    if not is_slow(speed).any():
         knots = np.arange(rows.start, rows.stop, every)
         return knots, driven[knots]
     own, ticks, nearest = ticks_of(time, speed, every * float(time[1] - time[0]))
     moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)
     distance = np.interp(ticks, own[moved], driven[rows][moved])
-    distance[-1] += max(ticks[-1] - own[-1], 0.0) * way_of(float(speed[-1]))
+    distance[-1] += max(ticks[-1] - own[-1], 0.0) * float(way_of(speed[-1:])[0])
     return rows.start + nearest, distance
 
 

@@ -218,7 +218,7 @@ def _sampled(segment: SampledSegment, vehicle: EntityMotion, driven: FloatArray,
         distance = np.interp(segment.time, vehicle.time, driven)
     speeds = vehicle.speed[[segment.span.first, segment.span.last]]
     if is_last:
-        step = STEP * way_of(float(speeds[1]))
+        step = STEP * float(way_of(speeds[1:])[0])
         distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
         offset = np.append(offset, segment.beyond)
     settling = SETTLING_TIME * speeds

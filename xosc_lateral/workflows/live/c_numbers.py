@@ -13,6 +13,7 @@ import numpy as np
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, TIME, context_range
 from xosc_lateral.base.names import in_c
+from xosc_lateral.base.own_clock import HALF_RATE_SPEED, SPEED_SLACK
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import effects as kinds
@@ -97,7 +98,8 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
         "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
         "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER_SHARE * paths.LARGEST_TURN_RATE,
-        "STEP_PEAK": paths.STEP_PEAK, "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "STEP_PEAK": paths.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST, "LARGEST_SINE": paths.LARGEST_SINE,
+        "HALF_RATE_SPEED": HALF_RATE_SPEED, "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
