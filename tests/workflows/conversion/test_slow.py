@@ -10,6 +10,8 @@ import pytest
 from tests.kit.motion import STEP, drive, entity, together, two_roads
 from xosc_lateral.base.own_clock import LARGEST_HEADING, clock_rate
 from xosc_lateral.files.profiles import find_profile, read_profile
+from xosc_lateral.files.templates import find_template
+from xosc_lateral.workflows.conversion.convert import convert
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.result import Enriched, Neighbours
 from xosc_lateral.world.road.network import RoadNetwork
@@ -80,3 +82,24 @@ def test_at_40_km_h_and_above_the_clock_changes_nothing(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     fast, equal = (enriched(network, np.full(501, pace), cars=2) for pace in (40 / 3.6, 11.1111))
     np.testing.assert_allclose(fast.entities[1].segments[0].offset, equal.entities[1].segments[0].offset, atol=1e-6)
+
+
+def test_a_jam_corridor_is_left_where_it_is_asked_for_and_said_to_be_assumed(tmp_path: Path) -> None:
+    for file, text in find_template("jam-end").files({}).items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    plain, aside = (
+        convert(tmp_path / "jam-end.xosc", seed=1, ego=["none"], mode="trajectory", jam_corridor=asked)
+        for asked in (False, True)
+    )
+    moved = [
+        (one.deviation[-1] - other.deviation[-1], one.motion.lane[-1])
+        for one, other in zip(aside.movement.entities, plain.movement.entities, strict=True)
+        if one.name.startswith("Jam")
+    ]
+    leftmost = max(lane for _, lane in moved)
+    for by, lane in moved:
+        assert 0.25 < by * (1.0 if lane == leftmost else -1.0) <= 0.45  # who is beside gives way a little
+    assert any("jam corridor: assumed" in line for line in aside.warnings)
+    assert not any("jam corridor" in line for line in plain.warnings)
+    assert aside.provenance.options["jam_corridor"] is True
+    assert aside.provenance.profiles == plain.provenance.profiles

@@ -157,6 +157,8 @@ def _segment(surroundings: Surroundings, index: int, knots: IntArray, every: int
     after = int(later.min(initial=stop - knots[-1] - 1)) // every
     grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
     context = surroundings.context(index, grid)
+    on_motorway = np.array([road.is_motorway and road.junction is None for road in surroundings.network.roads], bool)
+    context["motorway"] = ((entity.road[grid] >= 0) & on_motorway[entity.road[grid]]).astype(np.float64)
     for name, (time, values) in contexts.items():
         context[name] = np.interp(entity.time[grid], time, values)
     lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))

@@ -90,5 +90,6 @@ def test_how_far_apart_drivers_keep_changes_nothing_about_their_wander() -> None
 
 def test_a_search_that_does_not_end_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(likelihood, "MAXIMUM_TURNS", 2)
+    monkeypatch.setattr(likelihood, "LAST_STEPS", 0)
     with pytest.warns(UserWarning, match="slow movement is not sure: its fit had not ended after 2 turns"):
         fit_autoregression(walks(9, 100, 1, 1.0), 4, every=1, drivers=list("abcdefghi"))
