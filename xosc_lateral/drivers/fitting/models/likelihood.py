@@ -195,7 +195,7 @@ def _highest(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[Fl
     best = np.asarray(found.x)
     for _ in range(LAST_STEPS):
         best = best - 2.0 * inverse @ slope(best)
-    return best, bool(np.abs(slope(best)).max() < FLATNESS)
+    return best, bool(np.abs(slope(best)).max() < 10.0 * FLATNESS)
 
 
 def partial_autocorrelations(coefficients: FloatArray) -> FloatArray:
