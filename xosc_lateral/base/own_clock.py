@@ -1,9 +1,9 @@
 """The clock that a driver's movement in the lane runs on: real time from 40 km/h on, slower below, none at rest.
 
 A car that stands does not slide: it stays where its driver stopped, and how far drivers spread stays too. Below 40 km/h
-drivers move sideways nearly as fast as above. At a signalled junction (DLR Urban Traffic v1.2.0, 207 vehicles at 0 to
-15 m/s) lateral speed goes with speed to the power of 0.18 (0.11 to 0.24): movement neither goes by the distance driven
-nor fades (docs/validation/driver_model.md).
+drivers move sideways nearly as fast as above. At a signalled junction (DLR Urban Traffic v1.2.0, 0 to 17 m/s) lateral
+speed grows with speed to the power of 0.2 to 0.4: movement goes neither by the distance driven nor by time, and it does
+not fade (docs/validation/driver_model.md).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 
 HALF_RATE_SPEED = 1.0
-"""Speed at which the clock runs about half as fast. The recording is fitted best by 0.4 m/s (0.2 to 0.7); errors of its
-tracker in motion, which nobody knows, make slow rows too lively. [m/s]"""
+"""Speed at which the clock runs about half as fast. The recording is fitted best by 0.4 or by 2 m/s, as its lanes are
+known: errors of its tracker make slow rows too lively, those of lanes fast ones. [m/s]"""
 
 LARGEST_HEADING = float(np.deg2rad(3.0))
 """Of a car that keeps its lane, relative to it: what would turn it further is put off. [rad]"""
