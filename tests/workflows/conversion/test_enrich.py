@@ -204,7 +204,7 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
 
 def test_who_is_not_enriched_keeps_every_bit_and_the_reason_is_given(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
-    slow = drive(network, entity("slow"), speed=8.0)
+    slow = drive(network, entity("slow"), speed=-8.0)
     result = enrich(
         SegmentedRun(together(slow, drive(network, entity("other"))), network),
         {"slow": simulated_profile(), "other": "why not"},
