@@ -11,7 +11,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
+from msgspec import structs
+
 from xosc_lateral.base.errors import DriverProfileError, FormatError
+from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
+from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
@@ -22,7 +26,7 @@ from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers, other_egos
 from xosc_lateral.workflows.conversion.prepared import prepare
-from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
+from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
@@ -123,6 +127,17 @@ def carry_out(plan: Plan) -> Conversion:
     return _conversion(plan, checked)
 
 
+CORRIDOR_NOTE = "jam corridor: assumed; no recording that we have shows how far drivers keep aside"
+
+
+def with_corridor(drivers: Drivers) -> dict[str, DriverProfile | str]:
+    """The same drivers, who leave a corridor in a jam on a motorway."""
+    return {
+        name: one if isinstance(one, str) else structs.replace(one, effects=(*one.effects, JamCorridor()))
+        for name, one in drivers.items()
+    }
+
+
 def sample(plan: Plan) -> Enriched:
     """Offsets of every vehicle that has a driver, for as long as the output may run."""
     settings, played = plan.settings, plan.played
@@ -136,7 +151,7 @@ def sample(plan: Plan) -> Enriched:
         )
         return enrich(
             run,
-            plan.drivers,
+            with_corridor(plan.drivers) if settings.jam_corridor else plan.drivers,
             seed=settings.seed,
             variant=plan.variant_index,
             seed_words=seed_words_of(played.motion, played.network),
@@ -193,6 +208,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *written.warnings,
         *(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
         *validity_warnings(movement),
+        *((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )
     return Conversion(
         source=plan.source,

@@ -11,7 +11,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.own_clock import way_of
 from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
@@ -75,13 +77,17 @@ class Written:
 def write(plan: Plan, sampled: Enriched) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    folder, profiles = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile}
+    folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
         scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
         inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
-        profiles={name: (profile.name, profile_hash(profile)) for name, profile in profiles.items()},
+        profiles={
+            name: (one.name, profile_hash(one))
+            for name, one in plan.drivers.items()
+            if name in driven and not isinstance(one, str)
+        },
         options=plan.settings.record(folder),
         variant=plan.variant_index + 1,
         version=version_text(plan.version),
@@ -171,7 +177,9 @@ def _in_phase(
 def _ring(segment: SampledSegment, *, from_middle: bool) -> Ring:
     """Along what was sampled, with what was sampled beyond the segment's end."""
     offset = np.append(segment.offset, segment.beyond)
-    time = (segment.time[1] - segment.time[0]) * np.arange(len(offset))
+    time = np.append(segment.time, segment.time[-1] + STEP * np.arange(1, len(segment.beyond) + 1)) - segment.time[0]
+    goes_on = np.diff(time, prepend=-1.0) > 0.0
+    time, offset = time[goes_on], offset[goes_on]
     grid = np.arange(0.0, min(float(time[-1]), LONGEST_TURN), GRID)
     path: FloatArray = NaturalSpline.natural(time, offset)(grid)
     return ring_along(grid, path, from_middle=from_middle)
@@ -209,10 +217,12 @@ def _path(
 
 def _sampled(segment: SampledSegment, vehicle: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
     """One segment by the distance driven, the last one with what was sampled beyond it, at the speed of its end."""
-    distance, offset = np.interp(segment.time, vehicle.time, driven), segment.offset
+    offset, distance = segment.offset, segment.distance
+    if distance is None:
+        distance = np.interp(segment.time, vehicle.time, driven)
     speeds = vehicle.speed[[segment.span.first, segment.span.last]]
     if is_last:
-        step = float(speeds[1]) * (segment.time[1] - segment.time[0])
+        step = STEP * float(way_of(speeds[1:])[0])
         distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
         offset = np.append(offset, segment.beyond)
     settling = SETTLING_TIME * speeds
