@@ -57,7 +57,6 @@ EXAMPLES: tuple[Effect, ...] = (
         factors=(Factor(column="x"), Factor(column="y", form=Form.SINE, at=360.0)),
         **ONE,
     ),
-    JamCorridor(),
     Drift(size=0.2),
     Step(size=0.2, at_s=40.0),
     VarianceTrend(factor=2.0, to_s=100.0),
@@ -69,7 +68,8 @@ EXAMPLES: tuple[Effect, ...] = (
     ),
     Adapted(shift=-0.1, spread=1.2, rate=0.8, fine=1.5),
 )
-"""One of each kind, of columns `x` and `y` (one has its own): every test of all effects takes them from here."""
+"""One of each kind, of columns `x` and `y`: every test of all effects takes them from here."""
+OF_OTHER_COLUMNS: tuple[Effect, ...] = (JamCorridor(),)
 
 
 def made(kind: type[C], *coefficients: float, acts: Acts = Acts.LOCATION, **fields: Any) -> C:
