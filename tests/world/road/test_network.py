@@ -259,7 +259,7 @@ def test_a_lean_on_a_grade_leads_along_s_and_finds_back():
 
 ROUGH = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="200" junction="-1">
 <planView><geometry s="0" x="3" y="-2" hdg="0" length="200"><line/></geometry></planView>
-<elevationProfile><elevation s="0" a="4" b="-0.06" c="4e-4" d="2e-6"/></elevationProfile>
+<elevationProfile><elevation s="0" a="4" b="-0.06" c="2e-3" d="2e-6"/></elevationProfile>
 <lateralProfile><superelevation s="0" a="-0.1" b="2e-3" c="-3e-6" d="0"/></lateralProfile>
 <lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
 <right><lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
@@ -269,7 +269,7 @@ ROUGH = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="20
 
 def _in_space(s: float, t: float) -> np.ndarray:
     """The leaning line is turned about the climbing one: along that (1, 0, grade), across it (-grade, 0, 1)."""
-    height, grade = 4 - 0.06 * s + 4e-4 * s**2 + 2e-6 * s**3, -0.06 + 8e-4 * s + 6e-6 * s**2
+    height, grade = 4 - 0.06 * s + 2e-3 * s**2 + 2e-6 * s**3, -0.06 + 4e-3 * s + 6e-6 * s**2
     lean, size = -0.1 + 2e-3 * s - 3e-6 * s**2, np.hypot(1.0, grade)
     upwards = np.array([-grade, 0.0, 1.0]) / size
     return np.array([3.0 + s, -2.0, height]) + t * (cos(lean) * np.array([0.0, 1.0, 0.0]) + sin(lean) * upwards)
