@@ -221,11 +221,3 @@ def output_scenario(output: PathLike, source: Path) -> Path:
 def default_output(source: Path) -> Path:
     """Where a converted scenario goes unless told otherwise: beside its source."""
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-
-
-def numbered(path: Path, variant_index: int, variants: int) -> Path:
-    """Path of one variant: as it is when there is one alone, else with its number, from 1, before the suffix."""
-    if variants == 1:
-        return path
-    digits = max(2, len(str(variants)))
-    return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")
