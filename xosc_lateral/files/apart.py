@@ -136,7 +136,6 @@ def serve() -> None:
         goes_on = status_bytes(1) - begin < MUCH_MEMORY
         pickle.dump((made, error, parsed, goes_on), answers, protocol=5)
         answers.flush()
-        made = error = None
 
 
 def _refuse(event: str, _: object) -> None:
