@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.source import guarding_inputs
+from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
@@ -108,6 +108,9 @@ def convert_scenario(
     written; nothing is left half-written.
     """
     with guarding_inputs():
+        for named in (settings.profile, *settings.entity.values(), settings.context, settings.road):
+            if isinstance(named, str | Path):  # though nobody may be driven by it
+                guard_input(Path(named))
         prepared = prepare(source, settings)
         plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
         return carry_out(plan)
