@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.meaning import keep_meaning
+from xosc_lateral.workflows.conversion.meaning import SIZES, keep_meaning
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_chain import Move, OffsetChain, Ring, Size, resized
@@ -91,6 +92,41 @@ def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offset
     _, kept = keep_meaning(chains, _nobody(), lambda _: (None, [change]))
     assert kept.chains == tuple(chains) and kept.smaller == {}
     assert kept.changes == change.changes
+
+
+def _places(chain: OffsetChain) -> np.ndarray:
+    return np.cumsum([chain.ring.origin, *(move.change for move in chain.ring.moves)])
+
+
+def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
+    """Whoever contradicts each trial sees all of them: none is larger than the sampled moves, nor on the other side."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-0.4, 0.4, (2, 6)).round(3)
+    chains = []
+    for entity, row in zip("AB", places, strict=True):
+        changes = np.diff(np.append(row, row[0])).tolist()
+        ring = Ring(float(row[0]), tuple(Move(0.0, 3.0, change) for change in changes))
+        chains.append(OffsetChain(entity, None, ring, placed_t=float(row[0]) - 1.75))
+    tried: list[OffsetChain] = []
+
+    def attempt(some: list[OffsetChain]) -> tuple[None, list[Comparison]]:
+        tried.extend(some)
+        change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
+        return None, [Comparison((), (change,) if len(tried) < 60 else ())]
+
+    keep_meaning(chains, _nobody(), attempt)
+    assert len({chain.ring for chain in tried}) > 6
+    for chain in tried:
+        sampled = _places(chains["AB".index(chain.entity)])
+        assert np.abs(_places(chain)).max() <= np.abs(sampled).max() + 1e-3
+        assert abs(chain.placed_t + 1.75 - chain.ring.origin) < 1e-9
+    for size in SIZES[:-1]:
+        for chain in chains:
+            made, sampled = _places(resized(chain, size)), _places(chain)
+            low, high = min(sampled.min(), 0.0), max(sampled.max(), 0.0)
+            assert low - 1e-3 <= made.min() and made.max() <= high + 1e-3, size
+            wanted = size.factor * size.limit * np.abs(sampled).max()
+            assert np.abs(made).max() == pytest.approx(wanted, abs=2e-3), size
 
 
 def test_moves_of_another_size_lead_back_to_where_they_began() -> None:

@@ -19,7 +19,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.source import guarding_inputs
+from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
@@ -112,6 +112,9 @@ def convert_scenario(
     written; nothing is left half-written.
     """
     with guarding_inputs():
+        for named in (settings.profile, *settings.entity.values(), settings.context, settings.road):
+            if isinstance(named, str | Path):  # though nobody may be driven by it
+                guard_input(Path(named))
         prepared = prepare(source, settings)
         plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
         return carry_out(plan)
@@ -237,11 +240,3 @@ def output_scenario(output: PathLike, source: Path) -> Path:
 def default_output(source: Path) -> Path:
     """Where a converted scenario goes unless told otherwise: beside its source."""
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-
-
-def numbered(path: Path, variant_index: int, variants: int) -> Path:
-    """Path of one variant: as it is when there is one alone, else with its number, from 1, before the suffix."""
-    if variants == 1:
-        return path
-    digits = max(2, len(str(variants)))
-    return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")
