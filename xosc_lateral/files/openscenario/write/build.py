@@ -226,6 +226,22 @@ class TimedVertices(Struct, frozen=True, eq=False):
             yield (f"\n{indent}" if begin else "") + text
 
 
+class RelativeVertices(Struct, frozen=True, eq=False):
+    """Vertices without times of a path beside an entity's present one, in the coordinates of its road."""
+
+    entity: str
+    places: FloatArray  # along s and t, shape (2, n) [m]
+
+    def text(self, indent: str, unit: str) -> Iterator[str]:
+        """XML of the vertices, as in `TimedVertices`; each has some time, which the schemas ask for."""
+        holder = etree.tostring(etree.Element("RelativeRoadPosition", entityRef=self.entity), encoding="unicode")
+        place = holder[:-2].replace("%", "%%") + ' ds="%s" dt="%s"/>'
+        vertex = f'<Vertex time="%s">\n{indent}{unit}<Position>{place}</Position>\n{indent}</Vertex>'
+        n = self.places.shape[1]
+        numbers = decimals(np.vstack((0.1 * np.arange(n), self.places)).T, (1, 3, 6))
+        yield f"\n{indent}".join([vertex] * n) % numbers
+
+
 class Vertices:
     """Polylines of a document, and where in it they go.
 
@@ -234,9 +250,9 @@ class Vertices:
 
     def __init__(self, source: bytes) -> None:
         self._mark = f"vertices-{hashlib.sha256(source).hexdigest()[:32]}"
-        self._polylines: list[TimedVertices] = []
+        self._polylines: list[TimedVertices | RelativeVertices] = []
 
-    def add(self, owner: etree._Element, polyline: TimedVertices) -> None:
+    def add(self, owner: etree._Element, polyline: TimedVertices | RelativeVertices) -> None:
         """Let an element hold these vertices and nothing else."""
         owner.append(etree.ProcessingInstruction(self._mark, str(len(self._polylines))))
         self._polylines.append(polyline)
