@@ -63,6 +63,8 @@ LONGER = 1.5
 times as long, one at 0.8 times after 1.25 times. [-]"""
 TRIAL_STEP = 0.05
 """Of runs under other egos: they are about what happens. [s]"""
+OTHER_FRAMES = (0.9, 2.5)
+"""Times a run's step, in which the source is played again where an output does something else. [-]"""
 AFTERMATH_TIME = 2.0
 """After the last event of all, such a run is over: the last lane is reached, contacts have come about. [s]"""
 
@@ -150,8 +152,22 @@ class Meaning:
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            comparisons.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends))
+            found = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
+            if found.changes:
+                chance = self._by_chance(driven, nominal, trajectories)
+                found = structs.replace(found, changes=tuple(one for one in found.changes if one.what not in chance))
+            comparisons.append(found)
         return comparisons, after[0]
+
+    def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> set[str]:
+        """What a source itself does otherwise in frames of another length: two things that meet in one frame."""
+        network, chance = self._played.network, set[str]()
+        for factor in OTHER_FRAMES:
+            again = play(driven, network, step=factor * before.step, time_limit=self.limit)
+            ends = before.ended_by == again.ended_by
+            compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
+            chance |= {one.what for one in compared.changes}
+        return chance
 
 
 def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:

@@ -37,6 +37,8 @@ from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
+ROUNDING = 1e-6
+"""Of times that are sums of frames. [s]"""
 LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
@@ -98,7 +100,7 @@ def compare_runs(
             (shift.unexplained_start, shift.start, "happens"),
             (shift.unexplained_end, shift.end, "is over"),
         ):
-            if abs(rest) > EVENT_TOLERANCE:
+            if abs(rest) > max(EVENT_TOLERANCE, before.step) + ROUNDING:
                 changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}"))
     for key, action in now.items():
         if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:

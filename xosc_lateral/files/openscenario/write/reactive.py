@@ -104,15 +104,13 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
 
 def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
     """A trajectory each: the reference player finds the places of vertices when it starts, so it may run once."""
-    maneuver, begins = build.maneuver(act, name, path.entity), ("act", name, "runningState")
+    maneuver, begins = build.maneuver(act, f"{name} path", path.entity), ("act", name, "runningState")
     for number, piece in enumerate(path.pieces, start=1):
         event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, draft.version)
         action = build.private_action(event, f"{name}.{number} action")
         follow = build.sub(action, "RoutingAction/FollowTrajectoryAction")
         holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
-        polyline = build.sub(
-            build.sub(holder, "Trajectory", name=f"{name}.{number} path", closed="false"), "Shape/Polyline"
-        )
+        polyline = build.sub(build.sub(holder, "Trajectory", name=f"{name}.{number}", closed="false"), "Shape/Polyline")
         draft.vertices.add(polyline, build.RelativeVertices(path.entity, path.side * np.stack(piece)))
         build.sub(follow, "TimeReference/None")
         build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
