@@ -20,7 +20,7 @@ from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_gr
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
-from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
@@ -155,18 +155,19 @@ class Meaning:
             found = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
             if found.changes:
                 chance = self._by_chance(driven, nominal, trajectories)
-                found = structs.replace(found, changes=tuple(one for one in found.changes if one.what not in chance))
+                others = (one for one in found.changes if abs(one.size) > chance.get(one.what, 0.0))
+                found = structs.replace(found, changes=tuple(others))
             comparisons.append(found)
         return comparisons, after[0]
 
-    def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> set[str]:
-        """What a source itself does otherwise in frames of another length: two things that meet in one frame."""
-        network, chance = self._played.network, set[str]()
+    def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
+        """What a source itself does otherwise, and by how much, in other frames: two things that meet in one. [s]"""
+        network, chance = self._played.network, dict[str, float]()
         for factor in OTHER_FRAMES:
             again = play(driven, network, step=factor * before.step, time_limit=self.limit)
             ends = before.ended_by == again.ended_by
             compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
-            chance |= {one.what for one in compared.changes}
+            chance |= {one.what: max(abs(one.size), chance.get(one.what, 0.0)) for one in compared.changes}
         return chance
 
 
@@ -229,7 +230,8 @@ class Kept:
                 yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
         for shift in self.shifts:
             longer = shift.end - shift.start
-            if shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
+            is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE
+            if is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
                 yield (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
                     f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "

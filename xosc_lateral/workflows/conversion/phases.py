@@ -15,14 +15,29 @@ from xosc_lateral.files.openscenario.write.reactive import END_MARGIN
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
-from xosc_lateral.world.motion.offset_path import APPROACH_TIME, OffsetPath, Spacing, pieces_along, spacing_of
+from xosc_lateral.world.motion.offset_path import (
+    APPROACH_TIME,
+    Bridge,
+    Offset,
+    OffsetPath,
+    PathPiece,
+    Spacing,
+    approached,
+    calm,
+    pieces_along,
+    spacing_of,
+)
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
-from xosc_lateral.world.motion.way import way_of
+from xosc_lateral.world.motion.way import Break, way_of
 from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.private_actions import LATERAL, AcquirePositionAction, AssignRouteAction
 
-LEAST_LENGTH = 60.0
+LEAST_LENGTH = 20.0
 """A shorter path is none: it would hardly leave where it begins. [m]"""
+BRIDGE_START, BRIDGE_TIME = 2.0, 0.1
+"""The first place of a bridge is so far ahead, and as far as is driven in two frames of 0.05 s. [m], [s]"""
+BRIDGE_END = 5.0
+"""It ends so far before the place where the next path begins. [m]"""
 Path = tuple[str, ...]
 """Names of an action from the story down."""
 
@@ -91,8 +106,8 @@ class _Phases:
     def behind_breaks(self) -> Iterator[OffsetPath]:
         """From places on; it keeps the offset that the path before ended with."""
         for one in self._way.breaks:
-            start = float(self._offset(np.array([one.distance - END_MARGIN]))[0])
-            path = self._path(None, one.behind, start) if one.lanes else None
+            before = float(self._offset(np.array([one.behind - BRIDGE_END]))[0]) if one.lanes else 0.0
+            path = self._path(None, one.behind, before) if one.lanes else None
             if path is not None:
                 yield structs.replace(path, places=one.lanes)
 
@@ -106,16 +121,27 @@ class _Phases:
         end = float(way.distance[-1]) if ahead is None else ahead.distance - END_MARGIN
         if end - begin < LEAST_LENGTH:
             return None
-        foreseen = (self._driven_at(one.start) for one in self._own if one.path in self._lateral - depends.begins)
-        cut = min((at for at in foreseen if at > begin), default=np.inf) if is_known else np.inf
+        actions = {one.path: self._driven_at(one.start) for one in self._own if one.path in self._lateral}
+        foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
+        cut = min(foreseen, default=np.inf) if is_known else np.inf
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
-        approach = APPROACH_TIME * float(np.interp(begin, self._driven, np.abs(self._entity.motion.speed)))
-        pieces = pieces_along(
-            self._offset, self._spacing, cuts, start=start, approach=approach, calm_end=ahead is not None
-        )
-        side = way.side_at(begin)
-        ends = tuple(one.place for one in way.breaks if not is_known or one.distance > begin)
-        return OffsetPath(self._entity.name, after, pieces, side, ends=ends, span=way.span_at(begin))
+        offset = approached(self._offset, begin, start, APPROACH_TIME * self._speed_at(begin))
+        pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))
+        if ahead is not None and ahead.lanes and not any(begin < at < ahead.behind for at in actions.values()):
+            pieces.append(self._bridge(offset, ahead))
+        crossed = begin if ahead is None else ahead.distance
+        ends = tuple(one.place for one in way.breaks if not is_known or one.distance > crossed)
+        span = (0.0, np.inf) if is_known else way.span_at(begin)
+        return OffsetPath(self._entity.name, after, tuple(pieces), way.side_at(begin), ends=ends, span=span)
+
+    def _bridge(self, offset: Offset, over: Break) -> Bridge:
+        """Over a place that no other path leads over: the lane of the nominal way is known, without actions before."""
+        at = self._spacing.between(over.distance - END_MARGIN, over.behind - BRIDGE_END)
+        rows, aside = at >= at[0] + BRIDGE_START + BRIDGE_TIME * self._speed_at(float(at[0])), calm(offset, at)
+        return Bridge(*self._way.points(self._network, at[rows], aside[rows]))
+
+    def _speed_at(self, distance: float) -> float:
+        return float(np.interp(distance, self._driven, np.abs(self._entity.motion.speed)))
 
     def _driven_at(self, time: float) -> float:
         return float(np.interp(time, self._entity.motion.time, self._driven))

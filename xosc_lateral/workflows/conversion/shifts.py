@@ -59,6 +59,7 @@ class Change(Struct, frozen=True):
     entity: str | None
     time: float
     how: str
+    size: float = inf  # of a shift in time; infinite: it is none [s]
 
     def __str__(self) -> str:
         """One line."""
@@ -100,8 +101,8 @@ def compare_runs(
             (shift.unexplained_start, shift.start, "happens"),
             (shift.unexplained_end, shift.end, "is over"),
         ):
-            if abs(rest) > max(EVENT_TOLERANCE, before.step) + ROUNDING:
-                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}"))
+            if abs(rest) > max(EVENT_TOLERANCE, before.step, after.step) + ROUNDING:
+                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}", moved))
     for key, action in now.items():
         if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what = _named(key, action)
@@ -273,9 +274,9 @@ def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedActio
 
 def _other_end(shifts: _Shifts, before: NominalMotion, after: NominalMotion) -> Iterator[Change]:
     moved = after.end_time - before.end_time
-    if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + before.step:
+    if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + max(before.step, after.step):
         what = f"the end ({before.ended_by}) at {before.end_time:.2f} s"
-        yield Change(what, None, before.end_time, f"comes {_later(moved)}")
+        yield Change(what, None, before.end_time, f"comes {_later(moved)}", moved)
 
 
 def _other_lanes(before: NominalMotion, after: NominalMotion, ignored: Collection[str]) -> Iterator[Change]:

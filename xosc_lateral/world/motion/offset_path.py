@@ -42,13 +42,28 @@ class PathPiece(NamedTuple):
     distance: FloatArray  # from where it begins, increasing, shape (n,) [m]
     offset: FloatArray  # from where the entity is then, positive left, shape (n,) [m]
 
+    def resized(self, factor: float) -> PathPiece:
+        """With offsets of another size."""
+        return self._replace(offset=np.round(factor * self.offset, OFFSET_DECIMALS))
+
+
+class Bridge(NamedTuple):
+    """A path over what no other leads over: from where the entity is then, to places in the world, shape (2, n). [m]"""
+
+    nominal: FloatArray
+    aside: FloatArray  # from there to where it is driven
+
+    def resized(self, factor: float) -> Bridge:
+        """With offsets of another size."""
+        return self._replace(aside=factor * self.aside)
+
 
 class OffsetPath(Struct, frozen=True, eq=False):
     """What one entity drives in one phase."""
 
     entity: str
     after: tuple[str, ...] | None  # names from the story down of the action whose end begins it; None: none
-    pieces: tuple[PathPiece, ...]  # one after the other
+    pieces: tuple[PathPiece | Bridge, ...]  # one after the other
     side: float = 1.0  # +1: driven along s, else -1
     time: float = 0.0  # when it begins where no action and no place begins it [s]
     places: tuple[RoadPlace, ...] = ()  # it begins at one of these
@@ -62,7 +77,7 @@ class OffsetPath(Struct, frozen=True, eq=False):
 
 def resized(path: OffsetPath, factor: float) -> OffsetPath:
     """With offsets of another size; without any, and nothing to place, with a factor of 0."""
-    pieces = (one._replace(offset=np.round(factor * one.offset, OFFSET_DECIMALS)) for one in path.pieces if factor)
+    pieces = (one.resized(factor) for one in path.pieces if factor)
     placed = path.placed_t if path.placed_t is None else path.placed_t - path.side * (1.0 - factor) * path.start
     return replace(path, pieces=tuple(pieces), placed_t=placed, start=factor * path.start)
 
@@ -91,30 +106,26 @@ def spacing_of(distance: FloatArray, speed: FloatArray, curvature: FloatArray) -
     return Spacing(distance, np.concatenate(([0.0], np.cumsum(np.diff(distance) / gap[1:]))))
 
 
-def pieces_along(
-    offset: Offset, spacing: Spacing, cuts: Sequence[float], *, start: float, approach: float, calm_end: bool
-) -> tuple[PathPiece, ...]:
-    """Pieces along offsets, from the first of some distances to the last; at those between a path ends calmly. [m]
-
-    - `start`: the offset that the entity has; it is led to its own within the length `approach` [m]
-    - `calm_end`: at the last distance, too
-    """
-    begin = cuts[0]
+def approached(offset: Offset, begin: float, start: float, approach: float) -> Offset:
+    """Offsets from a distance on, led to from where the entity is then, within a length. [m]"""
     away = float(offset(np.array([begin]))[0]) - start
+    length = max(approach, SETTLING_LENGTH)
+    return lambda at: offset(at) - away * (1.0 - smoother_step((at - begin) / length))
 
-    def led(at: FloatArray) -> FloatArray:
-        return offset(at) - away * (1.0 - smoother_step((at - begin) / max(approach, SETTLING_LENGTH)))
 
-    pieces = list[PathPiece]()
+def calm(offset: Offset, at: FloatArray, *, end: bool = True) -> FloatArray:
+    """Offsets at distances, shape (n,), that begin without lateral speed, and end so. [m]"""
+    room = min(SETTLING_LENGTH, 0.5 * float(at[-1] - at[0]))
+    values = offset(at) - settle(at - at[0], room, *_derivatives(offset, float(at[0])))
+    slope, bend = _derivatives(offset, float(at[-1])) if end else (0.0, 0.0)
+    return np.asarray(values - settle(at[-1] - at, room, -slope, bend))
+
+
+def pieces_along(offset: Offset, spacing: Spacing, cuts: Sequence[float], *, calm_end: bool) -> Iterator[PathPiece]:
+    """Pieces from the first of some distances to the last; without lateral speed at each but the last. [m]"""
     for first, last in pairwise(cuts):
         at = spacing.between(first, last)
-        room = min(SETTLING_LENGTH, 0.5 * (last - first))
-        values = led(at) - settle(at - first, room, *_derivatives(led, first))
-        if last < cuts[-1] or calm_end:
-            slope, bend = _derivatives(led, last)
-            values -= settle(last - at, room, -slope, bend)
-        pieces += _pieces(at, values)
-    return tuple(pieces)
+        yield from _pieces(at, calm(offset, at, end=calm_end or last < cuts[-1]))
 
 
 def _derivatives(offset: Offset, at: float) -> tuple[float, float]:

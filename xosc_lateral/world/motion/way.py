@@ -18,7 +18,7 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 SPACING = 5.0
 """Between places beyond the run's end. [m]"""
-CLEARANCE = 5.0
+CLEARANCE = 10.0
 """A path begins so far behind the begin of its road. [m]"""
 
 
@@ -36,7 +36,7 @@ class Break(NamedTuple):
     distance: float  # along the way [m]
     place: RoadPlace
     behind: float  # where the next one begins [m]; infinite: nowhere
-    lanes: tuple[RoadPlace, ...]  # there, in each lane that is driven that way
+    lanes: tuple[RoadPlace, ...]  # there, in each lane
     side: float  # there: +1 along s, -1 against it
     why: str
 
@@ -49,7 +49,20 @@ class Way(NamedTuple):
     lane: IntArray
     s: FloatArray  # [m]
     side: FloatArray  # +1: it is driven along s, -1: against it
+    offset: FloatArray  # the nominal one, positive to the left of the lane's travel [m]
     breaks: tuple[Break, ...]
+
+    def points(self, network: RoadNetwork, at: FloatArray, aside: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Places in the plane at distances along the way, and ways from there aside to the left, shape (2, n). [m]"""
+        k = np.clip(np.searchsorted(self.distance, at, side="right") - 1, 0, len(self.distance) - 2)
+        room, ahead = self.distance[k + 1] - self.distance[k], at - self.distance[k]
+        is_one_road = (self.road[k] == self.road[k + 1]) & (room > 0.0)
+        step = np.where(is_one_road, (self.s[k + 1] - self.s[k]) / np.where(room > 0.0, room, 1.0), self.side[k])
+        road, lane, offset = self.road[k], self.lane[k], self.offset[k]
+        left = self.side[k] * network.travel_directions(road, lane)
+        points = network.lane_points(road, lane, self.s[k] + step * ahead, offset, offset + left * aside)
+        nominal, there = (np.stack(point[:2]) for point in points)
+        return nominal, there - nominal
 
     def side_at(self, distance: float) -> float:
         """+1: along s, -1: against it."""
@@ -78,9 +91,11 @@ def way_of(motion: EntityMotion, network: RoadNetwork, length: float, *, has_rou
     ways = network.travel_directions(motion.road[rows], motion.lane[rows]) * motion.way(rows)
     driven, anew = distance_driven(motion)[rows], np.isin(rows, motion.breaks)
     found = list(zip(driven, motion.road[rows], motion.lane[rows], motion.s[rows], ways, strict=True))
+    offset = motion.offset[rows]
     beyond, ends = _onward(network, found[-1], length, has_route) if found else ([], False)
     distance, road, lane, s, side = np.array([*found, *beyond], dtype=np.float64).reshape(-1, 5).T
-    way = Way(distance, road.astype(np.int64), lane.astype(np.int64), s, side, ())
+    offset = np.append(offset, np.full(len(beyond), offset[-1] if len(offset) else 0.0))
+    way = Way(distance, road.astype(np.int64), lane.astype(np.int64), s, side, offset, ())
     return way._replace(breaks=tuple(_breaks(way, network, np.append(anew, np.zeros(len(beyond), bool)), ends)))
 
 
@@ -146,7 +161,7 @@ def _break(way: Way, network: RoadNetwork, k: int, why: str) -> Break:
             lanes = (
                 RoadPlace(network.road_ids[road], float(way.s[j]), lane.centre_t)
                 for lane in network.lanes_at(road, float(way.s[j]))
-                if lane.type == "driving" and lane.direction == int(way.side[j])
+                if lane.type == "driving"
             )
             return Break(distance, place, float(way.distance[j]), tuple(lanes), float(way.side[j]), why)
     return Break(distance, place, np.inf, (), 0.0, why)

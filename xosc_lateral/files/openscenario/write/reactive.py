@@ -21,7 +21,7 @@ from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
-from xosc_lateral.world.motion.offset_path import OffsetPath
+from xosc_lateral.world.motion.offset_path import Bridge, OffsetPath, PathPiece
 from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, driven_from_the_start, gives
 from xosc_lateral.world.scenario.enums import Priority
@@ -34,7 +34,7 @@ LOOK_DELAY = 0.06
 """So long after an act has begun its conditions look at what is, not at what has been: a frame of up to 0.05 s. [s]"""
 FIRST_WAIT = 0.12
 """A path waits so long, two such frames: what is to stop it may begin with the act. [s]"""
-END_MARGIN = 30.0
+END_MARGIN = 15.0
 """A path ends so far before a place that none leads over. [m]"""
 REACHED = 3.0
 """So near to a place, an entity is there: a frame of 0.1 s at 45 m/s is 4.5 m long. [m]"""
@@ -111,11 +111,18 @@ def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) 
         follow = build.sub(action, "RoutingAction/FollowTrajectoryAction")
         holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
         polyline = build.sub(build.sub(holder, "Trajectory", name=f"{name}.{number}", closed="false"), "Shape/Polyline")
-        draft.vertices.add(polyline, build.RelativeVertices(path.entity, path.side * np.stack(piece)))
+        draft.vertices.add(polyline, _vertices(path, piece))
         build.sub(follow, "TimeReference/None")
         build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
-        build.state_condition(build.sub(event, "StartTrigger/ConditionGroup"), *begins, FIRST_WAIT)
+        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
+        build.state_condition(build.sub(event, "StartTrigger/ConditionGroup"), *begins, wait)
         begins = "event", f"{name}.{number}", "completeState"
+
+
+def _vertices(path: OffsetPath, piece: PathPiece | Bridge) -> build.FreeVertices:
+    if isinstance(piece, Bridge):
+        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside)
+    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)))
 
 
 def _add_start(
