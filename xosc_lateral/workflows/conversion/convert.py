@@ -180,7 +180,9 @@ def check(plan: Plan, written: Written) -> Written:
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already.
         output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = source_meaning.compare(output, written.vehicles.trajectories)
+        comparisons, run = source_meaning.compare(
+            output, written.vehicles.trajectories, {path.entity for path in paths}
+        )
         return (trial, output, run), comparisons
 
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)

@@ -19,6 +19,7 @@ from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
@@ -81,6 +82,8 @@ SIZES = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
 LARGE_SHIFT = 0.3
 """Of its duration, by which an action lasts longer or shorter without a word. [-]"""
+LEAST_MOVING = 0.9
+"""Share of driving time below which it is told. [-]"""
 MOST_TRIALS = 40
 """Of a conversion: beyond, what is left is told. [-]"""
 
@@ -144,8 +147,13 @@ class Meaning:
             step = max(self._step, TRIAL_STEP)
             yield driven, play(driven, self._played.network, step=step, time_limit=self.limit)
 
-    def compare(self, scenario: Scenario, trajectories: Collection[str]) -> tuple[list[Comparison], NominalMotion]:
-        """With an output in which some entities follow trajectories: each run with its own; the nominal run of it."""
+    def compare(
+        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str]
+    ) -> tuple[list[Comparison], NominalMotion]:
+        """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
+
+        Each run with its own; and the nominal run of the output.
+        """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         comparisons, after = [], [run for _, run in self._runs(scenario)]
         for (driven, before), run in zip(self._before, after, strict=True):
@@ -157,7 +165,9 @@ class Meaning:
                 chance = self._by_chance(driven, nominal, trajectories)
                 others = (one for one in found.changes if abs(one.size) > chance.get(one.what, 0.0))
                 found = structs.replace(found, changes=tuple(others))
-            comparisons.append(found)
+            movement = changed_movement(network, before, run, moved)
+            shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
+            comparisons.append(structs.replace(found, changes=(*found.changes, *movement), moving=shares))
         return comparisons, after[0]
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
@@ -219,6 +229,14 @@ class Kept:
         """The largest of each event."""
         return largest_of(self.comparisons)
 
+    @property
+    def moving(self) -> dict[str, float]:
+        """The least share of its driving time in which each entity moves sideways. [-]"""
+        least: dict[str, float] = {}
+        for name, share in (pair for one in self.comparisons for pair in one.moving.items()):
+            least[name] = min(least.get(name, 1.0), 1.0 if share is None else share)
+        return least
+
     def warnings(self, unmoved: Collection[str]) -> Iterator[str]:
         """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
         for name in sorted(unmoved & self.smaller.keys()):
@@ -228,6 +246,10 @@ class Kept:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
                 yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+        for name, share in sorted(self.moving.items()):
+            if share < LEAST_MOVING:
+                moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
+                yield f"'{name}' {moves}, in one of the runs that it was tried in"
         for shift in self.shifts:
             longer = shift.end - shift.start
             is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE

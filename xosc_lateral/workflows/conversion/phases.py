@@ -28,7 +28,7 @@ from xosc_lateral.world.motion.offset_path import (
     spacing_of,
 )
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
-from xosc_lateral.world.motion.way import Break, way_of
+from xosc_lateral.world.motion.way import LANE_ENDS, Break, way_of
 from xosc_lateral.world.scenario.controllers import Domains
 from xosc_lateral.world.scenario.private_actions import LATERAL, AcquirePositionAction, AssignRouteAction
 
@@ -47,12 +47,12 @@ def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
     phases = _Phases(entity, plan)
     actions = plan.lateral.by_entity.get(entity.name, ())
     is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
-    found = []
+    found = list[OffsetPath | None]()
     if not plan.lateral.from_the_start.get(entity.name, Domains.NONE):
         is_there = bool(entity.motion.activity[0] & Activity.ACTIVE)
         found.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
     if not is_moved_along:
-        found += phases.behind_breaks()
+        found += phases.behind_breaks(found[0] if found else None)
     for action in actions:
         if not action.adds and (action.steers is False or (action.steers is None and not is_moved_along)):
             found.append(phases.after(action.path))
@@ -103,16 +103,22 @@ class _Phases:
         longest = max(self._entity.segments, key=lambda one: one.span.end - one.span.start)
         return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
 
-    def behind_breaks(self) -> Iterator[OffsetPath]:
-        """From places on; it keeps the offset that the path before ended with."""
+    def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
+        """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
+        known: float | None = 0.0 if first is None else first.end
+        actions = [self._driven_at(one.start) for one in self._own if one.path in self._lateral]
         for one in self._way.breaks:
-            before = float(self._offset(np.array([one.behind - BRIDGE_END]))[0]) if one.lanes else 0.0
-            path = self._path(None, one.behind, before) if one.lanes else None
+            if any(at < one.behind for at in actions):
+                known = None
+            path = self._path(None, one.behind, known) if one.lanes else None
             if path is not None:
+                known = None if known is None else path.end
                 yield structs.replace(path, places=one.lanes)
 
-    def _path(self, after: Path | None, begin: float, start: float, *, is_nominal: bool = True) -> OffsetPath | None:
-        """From a distance along the way on; None: too short, or off the road."""
+    def _path(
+        self, after: Path | None, begin: float, start: float | None, *, is_nominal: bool = True
+    ) -> OffsetPath | None:
+        """From a distance along the way on, and an offset there, if it is known; None: too short, or off the road."""
         way, depends = self._way, self._plan.depends
         if not len(way.distance):
             return None
@@ -125,18 +131,23 @@ class _Phases:
         foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
         cut = min(foreseen, default=np.inf) if is_known else np.inf
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
-        offset = approached(self._offset, begin, start, APPROACH_TIME * self._speed_at(begin))
+        offset: Offset = self._offset
+        if start is not None:
+            offset = approached(offset, begin, start, APPROACH_TIME * self._speed_at(begin))
         pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))
-        if ahead is not None and ahead.lanes and not any(begin < at < ahead.behind for at in actions.values()):
-            pieces.append(self._bridge(offset, ahead))
+        is_followed = ahead is not None and ahead.lanes and ahead.why != LANE_ENDS and start is not None
+        if ahead is not None and is_followed and not any(begin < at < ahead.behind for at in actions.values()):
+            end = ahead.behind - BRIDGE_END
+            pieces.append(self._bridge(offset, ahead, end))
         crossed = begin if ahead is None else ahead.distance
         ends = tuple(one.place for one in way.breaks if not is_known or one.distance > crossed)
         span = (0.0, np.inf) if is_known else way.span_at(begin)
-        return OffsetPath(self._entity.name, after, tuple(pieces), way.side_at(begin), ends=ends, span=span)
+        side, last = way.side_at(begin), float(offset(np.array([end]))[0])
+        return OffsetPath(self._entity.name, after, tuple(pieces), side, ends=ends, span=span, end=last)
 
-    def _bridge(self, offset: Offset, over: Break) -> Bridge:
+    def _bridge(self, offset: Offset, over: Break, end: float) -> Bridge:
         """Over a place that no other path leads over: the lane of the nominal way is known, without actions before."""
-        at = self._spacing.between(over.distance - END_MARGIN, over.behind - BRIDGE_END)
+        at = self._spacing.between(over.distance - END_MARGIN, end)
         rows, aside = at >= at[0] + BRIDGE_START + BRIDGE_TIME * self._speed_at(float(at[0])), calm(offset, at)
         return Bridge(*self._way.points(self._network, at[rows], aside[rows]))
 

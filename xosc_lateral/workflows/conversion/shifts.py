@@ -71,6 +71,8 @@ class Comparison(Struct, frozen=True):
 
     shifts: tuple[EventShift, ...]
     changes: tuple[Change, ...]
+    # moving: share of each vehicle's driving time in which it moves sideways; None: it does not drive [-]
+    moving: Mapping[str, float | None] = {}
 
 
 def compare_runs(
@@ -221,6 +223,8 @@ class _Shifts:
         powers = _powers(then)
         duration = (then.end or 0.0) - then.start
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
+        if ways[0] < LEAST_WAY <= ways[1]:  # over at once from the middle; from beside it, it takes its time
+            return [(now.end or 0.0) - now.start - duration]
         if not powers or min(ways) < LEAST_WAY:
             return [0.0]
         return [duration * ((ways[1] / ways[0]) ** power - 1.0) for power in powers]

@@ -72,7 +72,9 @@ class OffsetPath(Struct, frozen=True, eq=False):
     span: tuple[float, float] = (0.0, np.inf)
     # placed_t: the entity is put down there, along +t from the lane's centre, when the scenario begins [m]
     placed_t: float | None = None
-    start: float = 0.0  # the offset that it is put down with, positive left [m]
+    # start, end: the offset that it is put down with, and that it ends with if all is as in the nominal run [m]
+    start: float = 0.0
+    end: float = 0.0
 
 
 def resized(path: OffsetPath, factor: float) -> OffsetPath:

@@ -18,6 +18,9 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 SPACING = 5.0
 """Between places beyond the run's end. [m]"""
+LANE_ENDS = "the lane ends"
+LEAP = 0.8
+"""Sideways between two places: no lateral action is as fast, but who follows a lane that ends. [m]"""
 CLEARANCE = 10.0
 """A path begins so far behind the begin of its road. [m]"""
 
@@ -122,15 +125,17 @@ def _onward(network: RoadNetwork, last: Row, length: float, has_route: bool) -> 
 def _breaks(way: Way, network: RoadNetwork, anew: BoolArray, ends: bool) -> list[Break]:
     found: list[Break] = []
     again = 0
-    for k in np.flatnonzero(np.diff(way.road) != 0).tolist():
+    t = network.offset_to_t(way.road, way.lane, way.s, way.offset)
+    enters, leaps = np.diff(way.road) != 0, np.abs(np.diff(t)) > LEAP
+    for k in np.flatnonzero(enters | leaps).tolist():
         if k < again or anew[k + 1]:
             continue
-        why = _why(way, network, k)
+        why = _why(way, network, k) if enters[k] else LANE_ENDS
         if why:
             found.append(_break(way, network, k, why))
             again = int(np.searchsorted(way.distance, found[-1].behind))
     if ends and len(way.distance):
-        found.append(_break(way, network, len(way.road) - 1, "the lane ends"))
+        found.append(_break(way, network, len(way.road) - 1, LANE_ENDS))
     return found
 
 
@@ -141,7 +146,7 @@ def _why(way: Way, network: RoadNetwork, k: int) -> str:
         return "s runs the other way"
     options = network.next_lanes(here, int(way.lane[k]), side)
     if not options:
-        return "the lane ends"
+        return LANE_ENDS
     if len(options) > 1 and network.straightest(options).road != there:
         return "the way turns"
     return ""
