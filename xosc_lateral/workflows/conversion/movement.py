@@ -57,7 +57,12 @@ def _differences(network: RoadNetwork, source: EntityMotion, entity: EntityMotio
     row = int(np.argmax(slides[1]))
     if slides[1][row] > slides[0].max() + LARGEST_SLIDE:
         yield f"is put {slides[1][row]:.2f} m from where it drives", row
-    turns = [np.where(_is_free(one), np.abs(np.sin(one.heading_relative)), 0.0) for one in (source, entity)]
+    # roads of a junction lie on each other: which one it is on there is anybody's guess
+    crossing = np.array([road.junction is not None for road in network.roads])
+    turns = [
+        np.where(_is_free(one) & ~crossing[one.road], np.abs(np.sin(one.heading_relative)), 0.0)
+        for one in (source, entity)
+    ]
     row = int(np.argmax(turns[1]))
     if turns[1][row] > turns[0].max() + LARGEST_TURN:
         yield f"is turned by {turns[1][row]:.2f} rad", row
