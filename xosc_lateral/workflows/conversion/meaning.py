@@ -177,7 +177,8 @@ class Meaning:
             again = play(driven, network, step=factor * before.step, time_limit=self.limit)
             ends = before.ended_by == again.ended_by
             compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
-            chance |= {one.what: max(abs(one.size), chance.get(one.what, 0.0)) for one in compared.changes}
+            sizes = {one.what: abs(one.size) + again.step for one in compared.changes}
+            chance |= {what: max(size, chance.get(what, 0.0)) for what, size in sizes.items()}
         return chance
 
 

@@ -124,10 +124,9 @@ def _absolute(path: Path) -> Path:
 
 # ---- what esmini (3.6.0) wants: the one place of its quirks ----
 # All outputs are written such that it plays them to the millimetre, since other players mind none of that: vertices
-# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; lane offsets as half
-# cosines whose duration follows from the lateral acceleration (`offset_chain`); triggers without an edge, which it
-# would miss in its first frame. It reads every version, and passes over the `Motion` of vertices, since their times
-# say the same.
+# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; triggers without
+# an edge, which it would miss in its first frame. It reads every version, and passes over the `Motion` of vertices,
+# since their times say the same.
 _STOPS_AT = {
     ("Polyline", "Interpolation"),
     ("RoutingAction", "PreferredLaneLayerAction"),
