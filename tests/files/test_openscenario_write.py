@@ -366,7 +366,7 @@ def test_offsets_come_out_when_the_lane_offset_scenario_is_played(tmp_path: Path
     ego = played(read_scenario(tmp_path / "out.xosc"), 70.0).entities[0]
     # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left.
     assert ego.offset[0] == pytest.approx(0.2, abs=1e-4)
-    driven = ego.s - ego.s[0] - 14.0 * 0.12
+    driven = ego.s - ego.s[0] - 14.0 * 0.2
     assert np.abs(ego.offset - sine(driven))[driven > 60.0].max() < 0.003  # up to there it takes up its lateral speed
     assert np.abs(ego.s - motion.entities[0].s).max() < 0.02
 
@@ -389,7 +389,7 @@ def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_pa
     motion = played(scenario, 40.0)
     reactive(scenario, motion, [sine_path("Ego")], tmp_path / "out.xosc")
     ego, nominal_ego = played(read_scenario(tmp_path / "out.xosc"), 40.0).entities[0], motion.entities[0]
-    driven = ego.s - ego.s[0] - 0.12 * 25.0
+    driven = ego.s - ego.s[0] - 0.2 * 25.0
     assert np.abs(ego.offset - sine(driven))[driven > 60.0].max() < 0.003  # up to there it takes up its lateral speed
     still = ego.speed == 0.0
     assert still.sum() > 100 and np.ptp(ego.offset[still]) < 1e-9

@@ -97,7 +97,7 @@ class Spacing(Struct, frozen=True, eq=False):
     def between(self, first: float, last: float) -> FloatArray:
         """Distances of vertices from the first to the last, both included. [m]"""
         begin, end = np.interp((first, last), self.distance, self.count)
-        inside = np.linspace(begin, end, max(int(end - begin), 1) + 1)[1:-1]
+        inside = np.arange(begin + 1.0, end - 0.5)  # the last gap is a half to one and a half
         return np.concatenate(([first], np.interp(inside, self.count, self.distance), [last]))
 
 

@@ -32,8 +32,9 @@ from xosc_lateral.world.scenario.scenario import Scenario
 PATH_NAME = "xosc-lateral offsets"
 LOOK_DELAY = 0.06
 """So long after an act has begun its conditions look at what is, not at what has been: a frame of up to 0.05 s. [s]"""
-FIRST_WAIT = 0.12
-"""A path waits so long, two such frames: what is to stop it may begin with the act. [s]"""
+FIRST_WAIT = 0.2
+"""A path waits so long, at least two such frames: what is to stop it may begin with the act. Its vertices are then
+where those of a replay are, every 0.1 s. [s]"""
 END_MARGIN = 15.0
 """A path ends so far before a place that none leads over. [m]"""
 REACHED = 3.0
