@@ -15,6 +15,7 @@ import numpy as np
 from lxml import etree
 from msgspec import Struct
 
+from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -93,7 +94,10 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
     count, before = 1, None
     if begun_by is not None and begun_by.repeats:
         runs = sum(one.path == path.after and one.actor == path.entity for one in draft.motion.actions)
-        count = runs + SPARE_ACTS
+        if runs > REPEATED_RUNS.value:
+            what = f"{' / '.join(begun_by.path)}: {REPEATED_RUNS.refusal(runs)}"
+            draft.notes.append(f"'{path.entity}' has no offsets after more of them; {what}")
+        count = min(runs, int(REPEATED_RUNS.value)) + SPARE_ACTS
     for _ in range(count):
         act = build.sub(story, "Act", name=f"{PATH_NAME} {len(story) + 1}")
         name = str(act.get("name"))
