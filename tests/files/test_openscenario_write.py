@@ -38,7 +38,7 @@ from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.reactive import LateralActions
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_path import OffsetPath, pieces_along, spacing_of
+from xosc_lateral.world.motion.offset_path import OffsetPath, approached, pieces_along, spacing_of
 from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.position import Polyline, WorldPosition
@@ -334,7 +334,8 @@ def sine_path(entity_name: str, after: tuple[str, ...] | None = None, *, length:
     """20 cm to each side every 200 m, from the left turn on."""
     distance = np.arange(0.0, length, 5.0)
     spacing = spacing_of(distance, np.full(len(distance), 25.0), np.zeros(len(distance)))
-    pieces = pieces_along(sine, spacing, [0.0, length], start=0.0 if after else 0.2, approach=100.0, calm_end=False)
+    offset = approached(sine, 0.0, 0.0, 100.0) if after else sine
+    pieces = tuple(pieces_along(offset, spacing, [0.0, length], calm_end=False))
     return OffsetPath(entity_name, after, pieces, placed_t=None if after else 0.2, start=0.2)
 
 

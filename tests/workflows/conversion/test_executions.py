@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import SPARE_ACTS
 
 import xosc_lateral as xl
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.cli import main
+from xosc_lateral.files.openscenario.write.reactive import SPARE_ACTS
 from xosc_lateral.workflows.conversion import convert
 
 

@@ -62,6 +62,8 @@ CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 LONGER = 1.5
 """Times the longest of these runs, for which offsets last: an ego at 0.7 times its speed comes to a place after 1.43
 times as long, one at 0.8 times after 1.25 times. [-]"""
+LEAST_TIME = 60.0
+"""For which they do at least: where an end hangs on what a vehicle under test does, it may come late. [s]"""
 TRIAL_STEP = 0.05
 """Of runs under other egos: they are about what happens. [s]"""
 OTHER_FRAMES = (0.9, 2.5)
@@ -127,12 +129,12 @@ class Meaning:
     @property
     def longest(self) -> float:
         """Time that a run may take. [s]"""
-        return LONGER * max(motion.end_time for _, motion in self._before)
+        return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before))
 
     def farthest(self, name: str) -> float:
-        """Distance that an entity may drive in a run. [m]"""
+        """Distance that an entity may drive in that time, as fast as in the run in which it is fastest. [m]"""
         runs = (one for _, motion in self._before for one in motion.entities if one.name == name)
-        return LONGER * max(float(distance_driven(one)[-1]) for one in runs)
+        return self.longest * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
 
     def _runs(self, scenario: Scenario) -> Iterator[tuple[Scenario, NominalMotion]]:
         """Each run and what was played; all but the nominal one in coarser steps, until nothing is left to happen."""
