@@ -31,7 +31,7 @@ from xosc_lateral.workflows.conversion.load import play_scenario
 
 FloatArray = NDArray[np.float64]
 
-STEP, WINDOW, BEGIN, SECONDS = 0.04, 5.0, 6.0, 60.0
+STEP, WINDOW, BEGIN, SECONDS = 0.1, 5.0, 6.0, 60.0
 """Of samples, of windows, where they begin, and of runs. [s]"""
 BANDS = (0.15, 0.45, 0.8, 1.5, 3.0, 5.0)
 """Edges in which spectra are compared. [Hz]"""
