@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.openscenario.write.reactive import END_MARGIN
+from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
@@ -122,6 +122,7 @@ class _Phases:
         way, depends = self._way, self._plan.depends
         if not len(way.distance):
             return None
+        begin += FIRST_WAIT * self._speed_at(begin)
         is_known = is_nominal and (after is None or after not in depends.ends)
         ahead = way.next_break(begin) if is_known else None
         end = float(way.distance[-1]) if ahead is None else ahead.distance - END_MARGIN
@@ -138,17 +139,18 @@ class _Phases:
         is_followed = ahead is not None and ahead.lanes and ahead.why != LANE_ENDS and start is not None
         if ahead is not None and is_followed and not any(begin < at < ahead.behind for at in actions.values()):
             end = ahead.behind - BRIDGE_END
-            pieces.append(self._bridge(offset, ahead, end))
+            waits = FIRST_WAIT * (len(pieces) - 1)
+            pieces.append(self._bridge(offset, ahead, end, BRIDGE_TIME + waits))
         crossed = begin if ahead is None else ahead.distance
         ends = tuple(one.place for one in way.breaks if not is_known or one.distance > crossed)
         span = (0.0, np.inf) if is_known else way.span_at(begin)
         side, last = way.side_at(begin), float(offset(np.array([end]))[0])
         return OffsetPath(self._entity.name, after, tuple(pieces), side, ends=ends, span=span, end=last)
 
-    def _bridge(self, offset: Offset, over: Break, end: float) -> Bridge:
+    def _bridge(self, offset: Offset, over: Break, end: float, late: float) -> Bridge:
         """Over a place that no other path leads over: the lane of the nominal way is known, without actions before."""
         at = self._spacing.between(over.distance - END_MARGIN, end)
-        rows, aside = at >= at[0] + BRIDGE_START + BRIDGE_TIME * self._speed_at(float(at[0])), calm(offset, at)
+        rows, aside = at >= at[0] + BRIDGE_START + late * self._speed_at(float(at[0])), calm(offset, at)
         return Bridge(*self._way.points(self._network, at[rows], aside[rows]))
 
     def _speed_at(self, distance: float) -> float:
