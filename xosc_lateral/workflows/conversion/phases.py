@@ -11,6 +11,8 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.own_clock import way_of as way_of_clock
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
@@ -169,10 +171,13 @@ class _Phases:
 
 def _sampled(segment: SampledSegment, motion: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
     """One segment by the distance driven; the last one with what was sampled beyond it, at its usual speed."""
-    distance, offset = np.interp(segment.time, motion.time, driven), segment.offset
+    distance, offset = segment.distance, segment.offset
+    if distance is None:
+        distance = np.interp(segment.time, motion.time, driven)
     settling = SETTLING_TIME * motion.speed[[segment.span.first, segment.span.last]]
     if is_last and len(segment.beyond):
-        step = float(np.mean(np.diff(distance)))
+        usual = float(np.median(np.abs(motion.speed[segment.span.first : segment.span.last + 1])))
+        step = STEP * float(way_of_clock(np.array([usual]))[0])
         distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
         offset = np.append(offset, segment.beyond)
     return SampledDeviation(distance, offset, (float(settling[0]), float(settling[1])))
