@@ -33,13 +33,10 @@ from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain
+from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
-SUPPLY_TIME = 60.0
-"""Movement sampled for each segment of a reactive output, at least; a run in which the segment lasts longer repeats it.
-Some of a driver's slow movement is seen in that time. [s]"""
 
 
 @spelled_out(ConvertSettings)
@@ -162,7 +159,7 @@ def sample(plan: Plan) -> Enriched:
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
             lane_changes=settings.lane_changes,
-            least_time=0.0 if plan.is_replay else SUPPLY_TIME,
+            least_time=0.0 if plan.is_replay else plan.prepared.meaning(tuple(plan.egos)).longest,
         )
     except DriverProfileError as error:  # sampling does not know the file
         raise DriverProfileError(f"{plan.source}: {error}") from error
@@ -180,16 +177,18 @@ def check(plan: Plan, written: Written) -> Written:
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
-    def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    def attempt(paths: Sequence[OffsetPath]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
-        if chains is not written.chains:  # those of the first trial are written already
-            trial = write_with(chains, plan, written.movement, written.vehicles, written.provenance)
+        if paths is not written.paths:  # those of the first trial are written already
+            trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already.
         output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = source_meaning.compare(output, written.vehicles.trajectories)
+        comparisons, run = source_meaning.compare(
+            output, written.vehicles.trajectories, {path.entity for path in paths}
+        )
         return (trial, output, run), comparisons
 
-    (best, output, run), kept = keep_meaning(written.chains, plan.played.motion, attempt)
+    (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
     return replace(best, movement=movement, shifts=kept.shifts, warnings=tuple(kept.warnings(unmoved)))
