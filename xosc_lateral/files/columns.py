@@ -161,10 +161,23 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------
+EPOCHS = {1.0: 1.0, 1e3: 1e-3, 1e6: 1e-6, 1e9: 1e-9}
+"""Units in a second -> unit of clocks that count since 1970: recordings are from after 1990 and before 2100. [s]"""
+
+
+def epoch_factor(time: FloatArray) -> float:
+    """Factor to seconds of numbers that count since 1970, by their size; 1 where they don't. [s]"""
+    known = time[np.isfinite(time)]
+    middle = float(np.median(known)) if len(known) else 0.0
+    return next((unit for count, unit in EPOCHS.items() if 6.3e8 * count < middle < 4.1e9 * count), 1.0)
+
+
 def require_row_step(step: float, path: Path) -> None:
     """Refuse a median step of rows that no recording has. [s]"""
     if not ROW_STEPS[0] <= step <= ROW_STEPS[1]:
-        unit = "ms, us or ns (time=COLUMN:ms)" if step > 1.0 else "s already"
+        units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # the likeliest: nearest to 20 rows/s
+        likely = min(units, key=lambda name: abs(np.log(step * units[name] / 0.05)))
+        unit = f"{likely} (time=COLUMN:{likely}), or count frames (time=COLUMN:1/25 s)" if step > 1.0 else "s already"
         what = f"rows are {step:.4g} s apart (median), {ROW_STEPS[0]:g} to {ROW_STEPS[1]:g} s are read"
         raise FormatError(f"{what}; the clock may be in {unit}", path=path, element="column 'time'")
 

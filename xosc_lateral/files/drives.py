@@ -16,8 +16,10 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
 from xosc_lateral.drivers.drives.drive import MIN_RUN, Drive
+from xosc_lateral.drivers.drives.identity import clock_runs
 from xosc_lateral.drivers.model.plausibility import drives_nobody, implausible, implausible_rows
 from xosc_lateral.files.columns import (
+    as_word,
     chosen_rows,
     comma_numbers,
     indicators,
@@ -29,7 +31,7 @@ from xosc_lateral.files.columns import (
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.tables import read_table
 
-LABELS = ("drive", "driver")  # columns that say which drive a row is of, and whose
+LABELS = ("drive", "driver", "recording")  # columns that say which drive a row is of, and whose
 WHEEL_WIDTH = 2.5
 """Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
 (1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
@@ -181,15 +183,24 @@ def _holds_levels(name: str, values: FloatArray) -> bool:
 
 
 def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    if "drive" not in table.columns:
-        yield file_label(path), np.arange(len(table))
-        return
-    codes, names = table["drive"].factorize()
-    if (codes < 0).any():
-        raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
-    order = np.argsort(codes, kind="stable")
-    bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
-    yield from zip(map(str, names), np.split(order, bounds), strict=True)
+    """Rows of each drive in file order: a recording's drive, or what of it a clock counts that begins again."""
+    labels = [name for name in ("recording", "drive") if name in table.columns]
+    codes, names = np.zeros(len(table), dtype=np.int64), [file_label(path)]
+    for name in labels:
+        if (missing := table[name].isna()).any():
+            raise FormatError("no value", path=path, line=int(np.argmax(missing)) + 2, element=f"column {name!r}")
+    if labels:
+        words = table[labels[-1]].map(str)
+        if len(labels) > 1 and table["recording"].nunique() > 1:
+            words = table["recording"].map(as_word) + ":" + words
+        codes, every = words.factorize()
+        names = list(map(str, every))
+    time = numbers_of(table["time"], path, "time") if "time" in table else np.zeros(len(table))
+    runs = clock_runs(time, codes)
+    for code, name in enumerate(names):
+        mine = np.flatnonzero(codes == code)
+        for number, run in enumerate(np.unique(runs[mine]).tolist()):
+            yield (name if number == 0 else f"{name}#{number + 1}"), mine[runs[mine] == run]
 
 
 # ---- what drives are called: a drive is its file, and its own label where the file gives one -------------------------
