@@ -19,6 +19,9 @@ from xosc_lateral.base.texts import composed
 USUAL_MARKERS = (32767.0, 32768.0, 65535.0, 2147483647.0, 4294967295.0)
 """Greatest whole numbers of two and four bytes: besides 999, 9999, ... what loggers write where there is no value."""
 
+NAMES_OF_DISTANCES = r"dist|abstand|gap|headway"
+FULL_BYTES = tuple(2.0**bits - 1.0 for bits in (8, 10, 12, 16, 24, 32))
+MOST_ROWS = 0.5  # a distance that is 0, all nines or full bytes in more of them is none that was measured [-]
 LEAST_MARKERS = 3  # a usual marker that is there so often, and is far from all else, is taken for one [rows]
 CONDITION = re.compile(r"\s*(.+?)\s*(==|!=|>=|<=|>|<)\s*(.+?)\s*")
 COMPARED = {
@@ -101,6 +104,14 @@ def _without_markers(column: pd.Series, missing: Sequence[float | str] | None, p
 def refuse_marker(values: FloatArray, name: str, path: Path) -> None:
     """Refuse a column of numbers with a usual marker for missing values that nobody has named."""
     known, count = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(known) > LEAST_MARKERS and re.search(NAMES_OF_DISTANCES, name, re.IGNORECASE):
+        usual = int(count.argmax())
+        value = float(known[usual])
+        is_full = value == 0.0 or (value.is_integer() and set(str(int(value))) == {"9"}) or value in FULL_BYTES
+        if is_full and usual in (0, len(known) - 1) and count[usual] > MOST_ROWS * count.sum():
+            what = f"{value:g} in {100 * count[usual] / count.sum():.0f} % of the rows: if it stands for no value, the"
+            what = f"{what} mapping needs missing = [{value:g}], else missing = []"
+            raise FormatError(what, path=path, element=f"column {name!r}")
     for k in (0, -1) if len(known) > 1 else ():
         size = abs(float(known[k]))
         nines = size >= 999.0 and size.is_integer() and set(str(int(size))) == {"9"}

@@ -27,6 +27,7 @@ LEAP_SPEED = 10.0  # no vehicle is slower or faster by so much from one row to t
 FROZEN_TIME = 0.5  # a moving vehicle that is at one place for longer was not seen; shorter, it is bridged [s]
 FROZEN_SPEED = 3.0  # who moves as fast before or after can't have stood there within a row [m/s]
 GLITCH_ROWS = 2  # so few rows between two leaps are an error of places, no vehicle
+NAMED = 20  # so many vehicles are named that leap
 REPEATED_DISTANCE, MOST_REPEATED = 2.0, 0.01  # one vehicle at two places at once [m], in so many of its rows [-]
 
 
@@ -89,8 +90,11 @@ def frozen(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:
     rows, step = np.zeros(len(time), dtype=np.bool_), np.maximum(np.diff(time), 1e-9)
     speed = np.hypot(np.diff(x), np.diff(y)) / step
     for part in true_slices(speed == 0.0):
-        around = [*speed[max(part.start - 1, 0) : part.start], *speed[part.stop : part.stop + 1]]
-        if max(around, default=0.0) > FROZEN_SPEED and time[part.stop] - time[part.start] > FROZEN_TIME:
+        around = speed[max(part.start - 3, 0) : part.start], speed[part.stop + 1 : part.stop + 4]  # a leap is no speed
+        if (
+            max((float(np.median(side)) for side in around if len(side)), default=0.0) > FROZEN_SPEED
+            and time[part.stop] - time[part.start] > FROZEN_TIME
+        ):
             rows[part.start + 1 : part.stop + 1] = True
     return rows
 
@@ -141,7 +145,7 @@ def identify(
     new = np.r_[True, (np.diff(code[rows]) != 0) | (np.diff(vehicle[rows]) != 0)] if len(rows) else np.zeros(0, bool)
     bounds = np.r_[np.flatnonzero(new), len(rows)]
     kept, whose, called, count = list[IntArray](), list[IntArray](), list[str](), Counter[str]()
-    several, leapt = len(stated) > 1, 0
+    several, leapt = len(stated) > 1, list[str]()
     for begin, end in pairwise(bounds.tolist()):
         mine = rows[begin:end]
         still = frozen(time[mine], x[mine], y[mine])
@@ -154,8 +158,9 @@ def identify(
             kept.append(part)
             whose.append(np.full(len(part), len(called)))
             called.append(name if count[name] == 1 else f"{name}#{count[name]}")
-        leapt += max(len(parts) - 1, 0)
-    notes = [f"{leapt} leaps of a vehicle: another one from there on (NAME#2 ...)"] if leapt else []
+        leapt += [called[-1].rpartition("#")[0]] if len(parts) > 1 else []
+    notes = [f"{name}: leaps of a vehicle: another one from there on ({name}#2 ...)" for name in leapt[:NAMED]]
+    notes += [f"{len(leapt) - NAMED} more vehicles leap"] if len(leapt) > NAMED else []
     if runs.any():
         notes.append(f"the clock begins again {int(runs.max())} times: another recording from there on (NAME#2 ...)")
     which = [

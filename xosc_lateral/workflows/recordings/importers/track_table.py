@@ -163,6 +163,10 @@ def tracks_of(
     codes, labels = rows["vehicle"].factorize(sort=True)
     time, x, y = (rows[name].to_numpy(dtype=np.float64) for name in ("time", "x", "y"))
     time = time * epoch_factor(time)
+    order = np.lexsort((time, codes))
+    steps = np.diff(time[order])[(np.diff(codes[order]) == 0) & (np.diff(time[order]) > 0.0)]
+    if len(steps):  # in a wrong unit, all that moves leaps
+        require_row_step(float(np.median(steps)), path)
     recording = list(rows["recording"]) if "recording" in rows else None
     try:
         known = identify(list(map(str, labels)), codes, time, x, y, recording)
