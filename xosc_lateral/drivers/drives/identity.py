@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.lazy import pd
@@ -74,15 +73,9 @@ def leaps(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:
     unseen = step > LONGEST_GAP
     broken |= unseen & (np.abs(along - about * step) > 0.5 * about * step + LEAP_DISTANCE)
     steps = np.hypot(*moved) / step
-    before, after = (np.array([np.median(part) for part in _windows(steps, side)]) for side in (-1, 1))
+    usual, rows = median_filter(steps, 5, mode="nearest"), np.arange(len(steps))
+    before, after = (usual[np.clip(rows + shift, 0, len(rows) - 1)] for shift in (-3, 2))  # of five before, five after
     return np.asarray(broken | (~unseen & (np.abs(after - before) > LEAP_SPEED)))
-
-
-def _windows(values: FloatArray, side: int) -> NDArray[np.float64]:
-    """The five values before each (-1), or from it on (1); the ends go on."""
-    padded = np.pad(values, 5, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    return np.asarray(windows[: len(values)] if side < 0 else windows[5 : 5 + len(values)])
 
 
 def frozen(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:

@@ -99,12 +99,10 @@ class Tracks:
 
     def of_recording(self, wanted: str | None, path: Path) -> list[Tracks]:
         """Each recording alone, or the one that is wanted. Raises `FormatError`: there is none such."""
-        if self.recording is None or len(self.recordings) < 2:
-            if wanted is not None and wanted not in self.recordings:
-                raise FormatError(f"no recording {wanted!r}; there are {listed(self.recordings) or 'none'}", path=path)
-            return [self]
         if wanted is not None and wanted not in self.recordings:
-            raise FormatError(f"no recording {wanted!r}; there are {listed(self.recordings)}", path=path)
+            raise FormatError(f"no recording {wanted!r}; there are {listed(self.recordings) or 'none'}", path=path)
+        if self.recording is None or len(self.recordings) < 2:
+            return [self]
         made = []
         for number, label in enumerate(self.recordings):
             mine = np.flatnonzero(self.recording == number)
