@@ -77,5 +77,5 @@ def class_of(word: object) -> str | None:
 def class_named(name: str) -> str:
     """The class that a name of somebody's choice speaks of, as ``truck_fast``; empty where it speaks of none."""
     plain = plain_word(name)
-    found = [class_of(part) for part in (plain, *re.sub(r"\d+", " ", plain).split())]
-    return next((known for known in found if known), "")
+    classes = [class_of(part) for part in (plain, *re.sub(r"\d+", " ", plain).split())]
+    return next((known for known in classes if known), "")

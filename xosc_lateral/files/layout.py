@@ -47,7 +47,7 @@ def layout_of(head: bytes, separator: str | None = None) -> Layout:
     def is_data(k: int, mark: str) -> bool:
         return any(_NUMBER.match(cell) for cell in cells(k, mark))
 
-    header, skipped, units = _found(rows, cells, is_data, separator)
+    header, skipped, units = _header_of(rows, cells, is_data, separator)
     before = [k for k in comments if k < header]
     mark = separator or max(SEPARATORS, key=lines[header].count)
     if before and is_data(header, mark) and len(cells(before[-1], mark)) == len(cells(header, mark)) > 1:
@@ -58,16 +58,16 @@ def layout_of(head: bytes, separator: str | None = None) -> Layout:
     return Layout(places[header] if header else 0, tuple(sorted(skipped)), separator, units)
 
 
-def _found(
+def _header_of(
     rows: list[int], cells: Callable[[int, str], list[str]], is_data: Callable[[int, str], bool], separator: str | None
 ) -> tuple[int, tuple[int, ...], tuple[str, ...]]:
     """Line of the header, lines below it that are no data, and units."""
     from xosc_lateral.files.mapping import spelled
 
     def units_of(k: int, mark: str) -> tuple[str, ...]:
-        found = cells(k, mark)
-        named = [cell for cell in found if cell.strip("[]()- ")]
-        return tuple(found) if named and all(spelled(cell) for cell in named) else ()
+        cells_there = cells(k, mark)
+        named = [cell for cell in cells_there if cell.strip("[]()- ")]
+        return tuple(cells_there) if named and all(spelled(cell) for cell in named) else ()
 
     for place, k in enumerate(rows[1:], 1):
         for mark in separator or SEPARATORS:
@@ -82,7 +82,7 @@ def _found(
             if not between:
                 continue
             heads = [k for k in between if len(set(cells(k, mark))) == width and not units_of(k, mark)]
-            units = next((found for row in between if (found := units_of(row, mark))), ())
+            units = next((cells_there for row in between if (cells_there := units_of(row, mark))), ())
             if heads and (block or len(between) > 1) and (block == 0 or len(cells(rows[block - 1], mark)) != width):
                 header = heads[0]
                 return header, tuple(row - header for row in between if row > header), units
