@@ -160,7 +160,7 @@ BAD = {
     "time in ms": (changed(time=table().time * 1000), FormatError, r"rows are 50 s apart \(median\).*:ms"),
     "too sparse": (table(rate=2.0), FormatError, r"rows are 0\.5 s apart"),
     "two drives in one": (
-        pd.concat([table(), table().assign(distance_left=1.0, distance_right=2.5)]),
+        pd.concat([table(), table().assign(distance_left=1.0, distance_right=2.5)]).sort_values("time"),
         FormatError,
         r"600 of 1200 rows repeat a time with another offset.*column 'drive'",
     ),

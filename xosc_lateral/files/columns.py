@@ -19,6 +19,9 @@ from xosc_lateral.base.texts import composed
 USUAL_MARKERS = (32767.0, 32768.0, 65535.0, 2147483647.0, 4294967295.0)
 """Greatest whole numbers of two and four bytes: besides 999, 9999, ... what loggers write where there is no value."""
 
+NAMES_OF_DISTANCES = r"dist|abstand|gap|headway"
+FULL_BYTES = tuple(2.0**bits - 1.0 for bits in (8, 10, 12, 16, 24, 32))
+MOST_ROWS = 0.5  # a distance that is 0, all nines or full bytes in more of them is none that was measured [-]
 LEAST_MARKERS = 3  # a usual marker that is there so often, and is far from all else, is taken for one [rows]
 CONDITION = re.compile(r"\s*(.+?)\s*(==|!=|>=|<=|>|<)\s*(.+?)\s*")
 COMPARED = {
@@ -101,6 +104,14 @@ def _without_markers(column: pd.Series, missing: Sequence[float | str] | None, p
 def refuse_marker(values: FloatArray, name: str, path: Path) -> None:
     """Refuse a column of numbers with a usual marker for missing values that nobody has named."""
     known, count = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(known) > LEAST_MARKERS and re.search(NAMES_OF_DISTANCES, name, re.IGNORECASE):
+        usual = int(count.argmax())
+        value = float(known[usual])
+        is_full = value == 0.0 or (value.is_integer() and set(str(int(value))) == {"9"}) or value in FULL_BYTES
+        if is_full and usual in (0, len(known) - 1) and count[usual] > MOST_ROWS * count.sum():
+            what = f"{value:g} in {100 * count[usual] / count.sum():.0f} % of the rows: if it stands for no value, the"
+            what = f"{what} mapping needs missing = [{value:g}], else missing = []"
+            raise FormatError(what, path=path, element=f"column {name!r}")
     for k in (0, -1) if len(known) > 1 else ():
         size = abs(float(known[k]))
         nines = size >= 999.0 and size.is_integer() and set(str(int(size))) == {"9"}
@@ -161,10 +172,23 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------
+EPOCHS = {1.0: 1.0, 1e3: 1e-3, 1e6: 1e-6, 1e9: 1e-9}
+"""Units in a second -> unit of clocks that count since 1970: recordings are from after 1990 and before 2100. [s]"""
+
+
+def epoch_factor(time: FloatArray) -> float:
+    """Factor to seconds of numbers that count since 1970, by their size; 1 where they don't. [s]"""
+    known = time[np.isfinite(time)]
+    middle = float(np.median(known)) if len(known) else 0.0
+    return next((unit for count, unit in EPOCHS.items() if 6.3e8 * count < middle < 4.1e9 * count), 1.0)
+
+
 def require_row_step(step: float, path: Path) -> None:
     """Refuse a median step of rows that no recording has. [s]"""
     if not ROW_STEPS[0] <= step <= ROW_STEPS[1]:
-        unit = "ms, us or ns (time=COLUMN:ms)" if step > 1.0 else "s already"
+        units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # the likeliest: nearest to 20 rows/s
+        likely = min(units, key=lambda name: abs(np.log(step * units[name] / 0.05)))
+        unit = f"{likely} (time=COLUMN:{likely}), or count frames (time=COLUMN:1/25 s)" if step > 1.0 else "s already"
         what = f"rows are {step:.4g} s apart (median), {ROW_STEPS[0]:g} to {ROW_STEPS[1]:g} s are read"
         raise FormatError(f"{what}; the clock may be in {unit}", path=path, element="column 'time'")
 

@@ -14,22 +14,40 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.cleaning import DRIVE_COLUMNS, LANE_WIDTHS, MAX_MEDIAN_SPEED, MAX_OUTSIDE, clean_drive
+from xosc_lateral.drivers.drives.cleaning import (
+    DRIVE_COLUMNS,
+    LANE_WIDTHS,
+    MAX_MEDIAN_SPEED,
+    MAX_OUTSIDE,
+    RESOLUTION,
+    RUN,
+    VALID_BELOW,
+    clean_drive,
+)
 from xosc_lateral.drivers.drives.drive import MIN_RUN, Drive
+from xosc_lateral.drivers.drives.identity import clock_runs
 from xosc_lateral.drivers.model.plausibility import drives_nobody, implausible, implausible_rows
 from xosc_lateral.files.columns import (
+    as_word,
     chosen_rows,
     comma_numbers,
+    epoch_factor,
     indicators,
     listed,
     numbers_of,
     plain_cells,
     seconds_of_stamps,
 )
-from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.tables import read_table
+from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping, standard_sources
+from xosc_lateral.files.tables import frame_of, read_table
 
-LABELS = ("drive", "driver")  # columns that say which drive a row is of, and whose
+LABELS = ("drive", "driver", "recording")  # columns that say which drive a row is of, and whose
+STANDARD = {
+    **{name: (name,) for name in (*sorted(DRIVE_COLUMNS - {RUN, VALID_BELOW, RESOLUTION}), *CONTEXT_UNITS)},
+    "recording": ("recording", "recording_id", "case_id", "scenario_id"),
+}
+"""Name -> headers, in any spelling and with units."""
+
 WHEEL_WIDTH = 2.5
 """Lanes of roads driven at 40 km/h and more are wider but for the left one at roadworks; from the wheels of a car
 (1.5 to 1.6 m apart) one of 3.0 to 3.75 m has 1.4 to 2.25 m. [m]"""
@@ -99,7 +117,7 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
     """The table under standard names and in standard units; what is not mapped stays as it is."""
-    table = table.rename(columns=lambda name: str(name).strip())
+    table = frame_of(table).rename(columns=lambda name: str(name).strip())
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
         raise FormatError(f"column {twice[0]!r} appears twice", path=path, line=1)
@@ -109,7 +127,10 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
             raise FormatError(what, path=path, line=1)
     table = chosen_rows(table, mapping.missing, mapping.rows, path)
     taken = {source.column for source in mapping.columns.values()} | mapping.columns.keys()
-    sources = {name: ColumnSource(name) for name in table.columns if name not in taken} | dict(mapping.columns)
+    free = [name for name in table.columns if name not in taken]
+    usual = standard_sources(free, {name: usual for name, usual in STANDARD.items() if name not in taken}, path)
+    named = {source.column: (name, source) for name, source in usual.items() if name not in free}
+    sources = dict(named.get(name, (name, ColumnSource(name))) for name in free) | dict(mapping.columns)
     kept = {}
     for name, source in sources.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
@@ -119,6 +140,9 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     if "time" in kept and not pd.api.types.is_numeric_dtype(kept["time"]):
         seconds = seconds_of_stamps(kept["time"], path, mapping.time_zone, kept.get("drive"))
         kept["time"] = kept["time"] if seconds is None else pd.Series(seconds, index=table.index)
+    if "time" in kept and pd.api.types.is_numeric_dtype(kept["time"]) and "time" not in mapping.columns:
+        since_1970 = epoch_factor(kept["time"].to_numpy(dtype=np.float64, na_value=np.nan))
+        kept["time"] = kept["time"] if since_1970 == 1.0 else kept["time"] * since_1970
     recorded = {name: value for name, value in mapping.recorded.items() if name not in kept}
     return from_middle(pd.DataFrame(kept).assign(**recorded), mapping, path)
 
@@ -181,19 +205,41 @@ def _holds_levels(name: str, values: FloatArray) -> bool:
 
 
 def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    if "drive" not in table.columns:
-        yield file_label(path), np.arange(len(table))
-        return
-    codes, names = table["drive"].factorize()
-    if (codes < 0).any():
-        raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")
-    order = np.argsort(codes, kind="stable")
-    bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
-    yield from zip(map(str, names), np.split(order, bounds), strict=True)
+    """Rows of each drive in file order: a recording's drive, or what of it a clock counts that begins again."""
+    labels = [name for name in ("recording", "drive") if name in table.columns]
+    codes, names = np.zeros(len(table), dtype=np.int64), [file_label(path)]
+    for name in labels:
+        if (missing := table[name].isna()).any():
+            raise FormatError("no value", path=path, line=int(np.argmax(missing)) + 2, element=f"column {name!r}")
+    if labels:
+        words = table[labels[-1]].map(str)
+        if len(labels) > 1 and table["recording"].nunique() > 1:
+            words = table["recording"].map(as_word) + ":" + words
+        codes, every = words.factorize()
+        names = list(map(str, every))
+    time = numbers_of(table["time"], path, "time") if "time" in table else np.zeros(len(table))
+    runs = clock_runs(time, codes)
+    for code, name in enumerate(names):
+        mine = np.flatnonzero(codes == code)
+        for number, run in enumerate(np.unique(runs[mine]).tolist()):
+            yield (name if number == 0 else f"{name}#{number + 1}"), mine[runs[mine] == run]
 
 
 # ---- what drives are called: a drive is its file, and its own label where the file gives one -------------------------
-FORMAT_ENDINGS = (".csv.gz", ".csv", ".parquet", ".mf4", ".mdf", ".dat", ".mcap", ".osi", ".xml")
+FORMAT_ENDINGS = (
+    ".csv.gz",
+    ".csv.zst",
+    ".feather",
+    ".arrow",
+    ".csv",
+    ".parquet",
+    ".mf4",
+    ".mdf",
+    ".dat",
+    ".mcap",
+    ".osi",
+    ".xml",
+)
 """Ends of file names that say how a file is written; whatever else has a dot belongs to the name (``2026.11.21``)."""
 
 

@@ -11,6 +11,7 @@ count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Be
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
@@ -25,13 +26,14 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import ANY_CONTEXT
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.texts import composed
+from xosc_lateral.base.vehicle_classes import CLASSES, class_of
 from xosc_lateral.files.columns import as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
 _BY_QUANTITY = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "in": 0.0254},
-    "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600},
+    "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600, "ft/s": 0.3048},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
     "angle": {"rad": 1.0, "deg": pi / 180},
     "angular speed": {"rad/s": 1.0, "deg/s": pi / 180},
@@ -78,6 +80,22 @@ def spelled(unit: str) -> str | None:
     return known if not known or known in UNITS else None
 
 
+def plain_header(text: str) -> str:
+    """In lower case, its words parted by underscores."""
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text)
+    return re.sub(r"[\s.:\-_/]+", "_", spaced).strip("_").lower()
+
+
+def parts_of(header: str) -> tuple[str, str]:
+    """A header without its unit, see `plain_header`, and the unit (``speed [km/h]``, ``time_ms``); empty: none."""
+    match = re.fullmatch(r"(.+?)[ _]*[\[(]([^\])]+)[\])]", header)
+    if match and spelled(match[2]):
+        return plain_header(match[1]), str(spelled(match[2]))
+    stem, _, last = header.rpartition("_")
+    unit = spelled(last) if stem else None
+    return (plain_header(stem), unit) if unit and unit != "-" else (plain_header(header), "")
+
+
 def is_measured(unit: str) -> bool:
     """Whether a unit of `UNITS` is that of a quantity, and not of a count, a flag or a share."""
     return unit in UNITS and UNITS[unit][0] != "number"
@@ -89,6 +107,8 @@ def factor(column: str, unit: str) -> float:
     Raises `ValueError` for an unknown unit, or one that measures something else.
     """
     sign, name = (-1.0, unit[1:]) if unit.startswith("-") and unit != "-" else (1.0, unit)
+    if count := re.fullmatch(r"(\d+\.?\d*)(?:/(\d+\.?\d*))? +(.+)", name):  # frames: 1/25 s
+        return sign * float(count[1]) / float(count[2] or 1.0) * factor(column, count[3])
     if name not in UNITS:
         raise ValueError(f"unknown unit {unit!r}; known: {', '.join(UNITS)}")
     quantity, to_si = UNITS[name]
@@ -145,11 +165,11 @@ class TableMapping:
         """Vehicle classes in words; numbers need the mapping's [values.vehicle_class]."""
         words = column.map(as_word)
         if self.classes:
-            return words.map(lambda word: self.classes.get(word, word))
-        if pd.api.types.is_numeric_dtype(column) and column.notna().any():
+            words = words.map(lambda word: self.classes.get(word, word))
+        elif pd.api.types.is_numeric_dtype(column) and column.notna().any():
             what = f"numbers such as {words.iloc[0]}: [values.vehicle_class] of the mapping says what they stand for"
             raise FormatError(what, path=path, element=f"column {str(column.name)!r}")
-        return words
+        return classes_of(words.mask(column.isna(), ""), path, str(column.name))
 
     def with_words(self, words: Mapping[str, str]) -> TableMapping:
         """With further columns, as ``--map`` has them, in place of those of the same name."""
@@ -167,6 +187,15 @@ class TableMapping:
             what = f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}"
             raise FormatError(what, path=path, line=int(strange.index[0]) + 2, element=f"column {name!r}")
         return texts.map({**known, "": np.nan}).astype(np.float64)
+
+
+def classes_of(words: pd.Series, path: Path, column: str) -> pd.Series:
+    """The classes that words stand for, see `base.vehicle_classes`. Raises `FormatError`: an unknown word."""
+    known = {word: class_of(word) for word in words.unique()}
+    if strange := [word for word, name in known.items() if name is None]:
+        what = f"{strange[0]!r} is no known class: [values.vehicle_class] of the mapping says what it is"
+        raise FormatError(f"{what} ({', '.join(CLASSES)})", path=path, element=f"column {column!r}")
+    return words.map(known)
 
 
 MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | str | Path"
@@ -203,6 +232,40 @@ def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
 def _source(name: str, words: str) -> ColumnSource:
     column, colon, unit = words.rpartition(":")
     return ColumnSource(column, factor(name, unit), unit) if colon else ColumnSource(words)
+
+
+def standard_sources(
+    headers: Iterable[object], names: Mapping[str, tuple[str, ...]], path: Path
+) -> dict[str, ColumnSource]:
+    """Where standard columns come from, by headers in any spelling and with units; `names`: headers of each.
+
+    Raises `FormatError`: a unit in brackets that is not known, or measures something else.
+    """
+    whole = {str(header).strip().lower(): str(header) for header in reversed(list(map(str, headers)))}
+    bare: dict[str, tuple[str, str]] = {}
+    for header in whole.values():
+        bare.setdefault(plain_header(header), (header, ""))
+    for header in whole.values():
+        stem, unit = parts_of(header.strip())
+        bare.setdefault(stem, (header, unit))
+    found = {}
+    for name, usual in names.items():
+        for header in usual:
+            if header in whole:
+                found[name] = ColumnSource(whole[header])
+            elif header in bare:
+                column, unit = bare[header]
+                try:
+                    found[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
+                except ValueError as error:
+                    if "[" in column or "(" in column:
+                        raise FormatError(str(error), path=path, element=f"column {column!r}") from error
+            elif strange := next((text for text in whole.values() if re.match(rf"{header}\s*\[", text, re.I)), None):
+                what = f"unknown unit; known: {', '.join(UNITS)}: --map {name}=COLUMN:UNIT names it"
+                raise FormatError(what, path=path, element=f"column {strange!r}")
+            if name in found:
+                break
+    return found
 
 
 def read_mapping(path: Path) -> TableMapping:

@@ -238,6 +238,9 @@ def file_state(path: Path) -> str:
 
 def parsed_hash(path: Path) -> str:
     """SHA-256 of the bytes that this process parsed, whatever the file is since; a file not parsed is hashed now."""
+    if path.is_dir():  # a table in parts
+        parts = "".join(parsed_hash(part) for part in sorted(path.rglob("*")) if part.is_file())
+        return hashlib.sha256(parts.encode()).hexdigest()
     try:
         return last_read(path)
     except KeyError:

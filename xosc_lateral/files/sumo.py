@@ -25,8 +25,6 @@ LENGTHS = {
 }  # fmt: skip
 """Of SUMO's vehicle classes (Vehicle Type Parameter Defaults); 5 m of all others. FCD output has no lengths. [m]"""
 
-TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
-
 ON_FOOT = frozenset({"pedestrian", "bicycle", "wheelchair", "scooter", "rail", "tram", "rail_urban", "subway", "ship"})
 """A lane for these alone is no driving lane."""
 

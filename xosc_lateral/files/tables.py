@@ -22,13 +22,15 @@ from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.columns import plain_cells
+from xosc_lateral.files.layout import HEAD_SIZE, Layout, layout_of, with_units
 from xosc_lateral.files.source import Source, open_source, parsed_hash
 
 if TYPE_CHECKING:
     from xosc_lateral.files.mapping import TableMapping
 
 PARQUET = ".parquet"
-TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET)
+FEATHER = (".feather", ".arrow")
+TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 _CHUNK = 1 << 20
 
@@ -36,7 +38,11 @@ _DOUBLE = 8
 
 
 def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
-    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written. Raises `FormatError`."""
+    """Read a CSV (packed or not), Parquet or Feather file, or a folder of Parquet, as it is; a mapping may say how text
+    is written. Raises `FormatError`.
+    """
+    if path.is_dir():
+        return _parts(path)
     if not path.name.lower().endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
     if mapping is None:
@@ -54,15 +60,42 @@ def _read(path: Path, encoding: str | None = None, separator: str | None = None,
     if path.name.lower().endswith(PARQUET):
         with foreign_errors(path, "can't be read as a table"):
             table: pd.DataFrame = read_parquet(path).to_pandas()
+            if isinstance(table.index, pd.DatetimeIndex):
+                table = frame_of(table)
             if not table.columns.is_unique:
                 twice = str(table.columns[table.columns.duplicated()][0])
                 raise FormatError(f"column {twice!r} appears twice", path=path)
             return table.rename(columns=composed)
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
+        if path.name.lower().endswith(FEATHER):
+            read: pd.DataFrame = _feather(source.file).to_pandas()
+            return frame_of(read).rename(columns=composed)
         text = _in_utf8(unpacked_text(source), path, encoding)
-        separator = separator or _separator(text, path)
+        layout = Layout() if "dtype" in csv else layout_of(text.read(HEAD_SIZE), separator)
+        text.seek(layout.start)
+        separator = separator or layout.separator or _separator(text, path, layout.start)
+        csv |= {"skiprows": list(layout.skipped)} if layout.skipped else {}
         table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
+        table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
+        table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
+
+
+def _is_filler(name: str, column: pd.Series) -> bool:
+    """A column without a name or a value, as a separator at the end of each line makes it."""
+    return name.startswith("Unnamed: ") and bool(column.isna().all())
+
+
+def _parts(folder: Path) -> pd.DataFrame:
+    """The table whose parts are the Parquet files of a folder, whose names of folders (``drive=7``) are columns."""
+    files = sorted(folder.rglob(f"*{PARQUET}"))
+    if not files:
+        raise FormatError(f"holds no table (*{PARQUET})", path=folder)
+    parts = []
+    for file in files:
+        keys = (part.partition("=") for part in file.relative_to(folder).parts[:-1])
+        parts.append(_read(file).assign(**{name: value for name, sign, value in keys if sign}))
+    return pd.concat(parts, ignore_index=True)
 
 
 def as_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -113,17 +146,49 @@ def _plain_reason(error: Exception) -> str:
 
 def unpacked_text(source: Source) -> IO[bytes]:
     """The file, unpacked within `limits` if it is gzip (by its first bytes, whatever its name)."""
-    packed = source.file.read(2) == b"\x1f\x8b"
+    magic = source.file.read(4)
     source.file.seek(0)
-    if not packed:
+    is_zstd = magic == ZSTD
+    if magic[:2] != b"\x1f\x8b" and not is_zstd:
         return source.file
     unpacked = io.BytesIO()
-    with gzip.GzipFile(fileobj=source.file) as file:
+    with _zstd(source.file) if is_zstd else gzip.GzipFile(fileobj=source.file) as file:
         while chunk := file.read(_CHUNK):
             unpacked.write(chunk)
             source.unpacked(unpacked.tell())
     unpacked.seek(0)
     return unpacked
+
+
+ZSTD = b"\x28\xb5\x2f\xfd"
+
+
+def _zstd(file: IO[bytes]) -> Any:
+    import pyarrow as pa
+
+    return pa.CompressedInputStream(pa.PythonFile(file, mode="r"), "zstd")
+
+
+def frame_of(given: Any) -> pd.DataFrame:
+    """Whatever holds columns as a data frame: Arrow's stream or pandas' interchange protocol, lazy frames of dask and
+    polars, a dict of arrays; times in the index become a column. Raises `TypeError`.
+    """
+    if not isinstance(given, pd.DataFrame):
+        for lazy in ("compute", "collect"):
+            given = getattr(given, lazy)() if hasattr(given, lazy) and not isinstance(given, dict) else given
+    if isinstance(given, dict):
+        given = pd.DataFrame(given)
+    elif not isinstance(given, pd.DataFrame) and hasattr(given, "__arrow_c_stream__"):
+        import pyarrow as pa
+
+        given = pa.table(given).to_pandas()
+    elif not isinstance(given, pd.DataFrame) and hasattr(given, "__dataframe__"):
+        given = pd.api.interchange.from_dataframe(given)
+    if not isinstance(given, pd.DataFrame):
+        raise TypeError(f"no table: {type(given).__name__}; a path, a data frame or a dict of columns is read")
+    if "time" not in given.columns and isinstance(given.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+        return given.reset_index(names="time")
+    return given
 
 
 def text_encoding(path: Path) -> str:
@@ -160,6 +225,12 @@ def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[byt
         raise FormatError(what, path=path) from error
 
 
+def _feather(file: IO[bytes]) -> Any:
+    import pyarrow.feather as feather
+
+    return feather.read_table(file, memory_map=False)
+
+
 @apart
 def read_parquet(path: Path, columns: Sequence[str] | None = None, otherwise: str = "") -> Any:
     """A Parquet file, or some columns of it, as an Arrow table.
@@ -184,10 +255,10 @@ def read_parquet(path: Path, columns: Sequence[str] | None = None, otherwise: st
         return file.read(None if columns is None else list(columns))
 
 
-def _separator(text: IO[bytes], path: Path) -> str:
+def _separator(text: IO[bytes], path: Path, start: int = 0) -> str:
     """Comma, semicolon or tab: the commonest in the header."""
     header, first = (text.readline(_CHUNK).decode("utf-8", errors="replace").rstrip("\r\n") for _ in range(2))
-    text.seek(0)
+    text.seek(start)
     separator = max(",;\t", key=header.count)
     if header.count(separator) >= TABLE_COLUMNS.value:
         raise FormatError(TABLE_COLUMNS.refusal(header.count(separator) + 1), path=path, line=1)

@@ -129,6 +129,7 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
     from xosc_lateral.files.mapping import as_mapping
+    from xosc_lateral.files.tables import frame_of
 
     several = isinstance(drives, Sequence) and not isinstance(drives, str | Path | Drive)
     items: list[Any] = list(drives) if several else [drives]  # type: ignore[arg-type]
@@ -145,8 +146,9 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
             read += read_drives(item, mapping)
         else:
             name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
-            read += drives_of_table(item, mapping, name)
-            inputs[name] = frame_hash(item)
+            frame = frame_of(item)
+            read += drives_of_table(frame, mapping, name)
+            inputs[name] = frame_hash(frame)
     return GivenDrives(with_distinct_names(read), parsed_hashes(files) | inputs, tuple(files))
 
 

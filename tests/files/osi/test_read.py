@@ -224,8 +224,8 @@ def test_stamps_twice_and_leaping_identifiers_are_noted(tmp_path) -> None:
     result = import_drives("osi", saved(tmp_path / "trace.mcap", made))
     assert set(result.to_frame()["drive"]) == {"7", "8", "8#2"}
     notes = result.to_dict()["notes"]
-    assert any("2 rows have the time stamp of the row before" in note for note in notes)
-    assert any("1 leaps of a vehicle" in note for note in notes)
+    assert any("2 rows left out: repeated time" in note for note in notes)
+    assert any("leaps of a vehicle" in note for note in notes)
     assert any("1 moving objects of type pedestrian" in note for note in notes)
     assert any("several host vehicles: 7, 8" in note for note in notes)
     assert "note: several host vehicles" in str(result)

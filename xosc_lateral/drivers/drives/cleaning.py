@@ -66,6 +66,7 @@ def clean_drive(
     """
     columns = _in_order(columns, name, path)
     if RUN not in columns:
+        _require_opposite(columns, name, path)
         place = np.isfinite(_position(columns)[0])
         columns = {key: _bridged(key, columns, levels, place) for key in columns}
     offset, lane_width = _position(columns)
@@ -94,6 +95,29 @@ def clean_drive(
         valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip
     return drive if run is not None else _seen_through(drive)
+
+
+TOGETHER, LEAST_MOVEMENT = 0.7, 0.02
+"""Correlation of how both distances change within a second from which they can't count from the vehicle to both sides:
+lanes hardly get wider so fast, and a camera errs at each side by itself [-]; changes below tell nothing [m]."""
+
+
+def _require_opposite(columns: Mapping[str, FloatArray], name: str, path: Path) -> None:
+    """Refuse distances to the markings that grow and shrink together."""
+    if not {"distance_left", "distance_right"} <= columns.keys() or len(columns["time"]) < 2:
+        return
+    rows = max(1, round(1.0 / max(float(np.median(np.diff(columns["time"]))), 1e-3)))
+    left, right = (columns[key][rows:] - columns[key][:-rows] for key in ("distance_left", "distance_right"))
+    known = np.isfinite(left + right) & (np.abs(left) < 1.0) & (np.abs(right) < 1.0)  # another lane is no movement
+    if known.sum() < 2 or min(left[known].std(), right[known].std()) < LEAST_MOVEMENT:
+        return
+    if (agreement := float(np.corrcoef(left[known], right[known])[0, 1])) > TOGETHER:
+        what = f"drive {name}: both grow and shrink together (correlation {agreement:.2f}), so one counts the other way"
+        raise FormatError(
+            f"{what}, or is not of the lane's other marking",
+            path=path,
+            element="columns 'distance_left', 'distance_right'",
+        )
 
 
 def _stated(column: str, columns: Mapping[str, FloatArray], good: BoolArray, path: Path) -> float | None:

@@ -23,7 +23,12 @@ from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, in_lanes, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
 from xosc_lateral.workflows.recordings.recorded import place_tracks
-from xosc_lateral.workflows.recordings.recordings import REAR_AXLE, USUAL_WIDTH, read_recording
+from xosc_lateral.workflows.recordings.recordings import (
+    REAR_AXLE,
+    USUAL_WIDTH,
+    RecordedTraffic,
+    read_recordings,
+)
 from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.player.player import play
@@ -135,8 +140,12 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------
 def _recorded(path: Path, settings: SourceSettings) -> Iterator[Scene]:
-    """Tracks of several vehicles, one scene."""
-    traffic = read_recording(path, road=settings.road, columns=settings.columns)
+    """Tracks of several vehicles, a scene for each recording."""
+    for traffic in read_recordings(path, road=settings.road, columns=settings.columns):
+        yield _scene_of(traffic, path, settings)
+
+
+def _scene_of(traffic: RecordedTraffic, path: Path, settings: SourceSettings) -> Scene:
     first, last = traffic.span
     recording = place_tracks(traffic.tracks, traffic.network, first, last)
     ego = None if settings.ego == "none" else settings.ego
@@ -147,7 +156,8 @@ def _recorded(path: Path, settings: SourceSettings) -> Iterator[Scene]:
         motion = in_lanes(vehicle, traffic.network)
         motion = motion.having(following=motion.following & (vehicle.way() > 0))
         tracks += tracks_of(motion, cluster=vehicle.name)
-    yield Scene(traffic.name, tuple(tracks), ego, traffic.network)
+    name = f"{traffic.name} {traffic.label}" if traffic.label else traffic.name
+    return Scene(name, tuple(tracks), ego, traffic.network)
 
 
 def drive_scenes(drives: Sequence[Drive]) -> Iterator[Scene]:

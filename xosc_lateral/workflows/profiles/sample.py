@@ -7,8 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.files.drives import file_label
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.files.tables import read_context, read_table
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -17,16 +25,15 @@ from xosc_lateral.workflows.result import (
     Paths,
     ProfileLike,
     Result,
+    as_paths,
     given_drives,
     given_profile,
     naming,
 )
 
 if TYPE_CHECKING:
-    from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.sampled_offsets import SampledOffsets
-    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
@@ -69,7 +76,9 @@ def sample(
         return Offsets(
             driver, made, seed, None, settings, (f"a free run: {unknown} {LEFT_OUT_NOTE}",) if unknown else ()
         )
-    tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+    tables = None if context is None else _context_alone(context, driver, lane_width, columns)
+    if tables is None:
+        tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
     drives = tables.drives
     if like is not None:
         with naming(tables):
@@ -79,6 +88,31 @@ def sample(
     return Offsets(
         driver, made, seed, tables, {} if like is None else {"snippet_s": snippet}, _unknown_columns(driver, drives)
     )
+
+
+def _context_alone(
+    context: DrivesLike, profile: DriverProfile, lane_width: float | None, columns: MappingLike | None
+) -> GivenDrives | None:
+    """Drives in the middle of a lane under tables that hold context over time and no place in a lane, as `convert
+    --context` takes them; None: they hold such places.
+    """
+    if as_mapping(columns) != TableMapping() or not isinstance(context, str | Path | list | tuple):
+        return None
+    files = as_paths(context) if isinstance(context, str | Path) else tuple(context)
+    if not all(isinstance(file, str | Path) for file in files):
+        return None
+    drives = []
+    for path in map(Path, files):
+        names = {plain_header(str(name)) for name in read_table(path).columns}
+        if any(name.startswith(("offset", "distance_left", "distance_right")) for name in names) or "drive" in names:
+            return None
+        known = read_context(path)
+        first, last = (pick(at[edge] for at, _ in known.values()) for pick, edge in ((min, 0), (max, -1)))
+        time = np.arange(first, last + 1e-9, STEP)
+        values = {name: np.interp(time, *over_time) for name, over_time in known.items()}
+        width = values.setdefault("lane_width", np.full(len(time), lane_width or profile.lane_width))
+        drives.append(Drive(file_label(path), time, np.zeros(len(time)), width, values, source=str(path)))
+    return GivenDrives(drives, parsed_hashes(map(Path, files)), tuple(map(Path, files)))
 
 
 LEFT_OUT_NOTE = "not known, left without effect"

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.vehicle_classes import class_of
+from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
@@ -184,14 +186,7 @@ def _fill(thing: Any, row: dict[str, Any]) -> None:
 
 
 # ---- what vehicles did, and where lanes are --------------------------------------------------------------------------
-KINDS = {
-    **dict.fromkeys(("SMALL_CAR", "COMPACT_CAR", "CAR", "MEDIUM_CAR", "LUXURY_CAR"), "car"),
-    **{"DELIVERY_VAN": "van", "VAN": "van", "HEAVY_TRUCK": "truck", "SEMITRACTOR": "truck", "MOTORBIKE": "motorcycle"},
-}
-"""`VehicleClassification.Type` -> vehicle class; others by their own names."""
-
 LANE_FIELDS = ("lane", "lane_boundary", "logical_lane", "logical_lane_boundary")  # what is kept besides objects
-LEAP_DISTANCE = 3.0  # farther than twice what it drives in a step, and by this much: not the same vehicle any more [m]
 ROW_SIZE = 12  # number, time, x, y, yaw, speed, length, pitch, roll; the rear axle, on the ground, from the middle
 
 
@@ -285,7 +280,7 @@ class _Collected:
         has_class = vehicle.HasField("vehicle_classification")
         if vehicle.type == kinds.TYPE_VEHICLE or (vehicle.type == kinds.TYPE_UNKNOWN and has_class):
             kind = kinds.VehicleClassification.Type.Name(vehicle.vehicle_classification.type).removeprefix("TYPE_")
-            self.kinds[name] = KINDS.get(kind, "" if kind in ("UNKNOWN", "OTHER") else kind.lower())
+            self.kinds[name] = "" if kind == "UNKNOWN" else class_of(kind) or ""
         else:
             self.left_out[kinds.Type.Name(vehicle.type).removeprefix("TYPE_").lower()] += 1
 
@@ -293,26 +288,18 @@ class _Collected:
         """All of it, in order."""
         rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, ROW_SIZE)
         notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in self.left_out.items())]
-        rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-        new = np.r_[True, (np.diff(rows[:, :2], axis=0) != 0).any(axis=1)] if len(rows) else np.zeros(0, dtype=bool)
-        if not new.all():
-            notes.append(f"{int((~new).sum())} rows have the time stamp of the row before: left out")
-            rows = rows[new]
-        same = rows[1:, 0] == rows[:-1, 0]
+        found, codes = np.unique(rows[:, 0].astype(np.int64), return_inverse=True)
+        labels = [self.names[number] for number in found.tolist()]
+        try:
+            known = identify(labels, codes, *rows[:, 1:4].T)
+        except ValueError as error:
+            raise FormatError(str(error), path=self.path) from error
+        notes += [*known.notes, *(f"{count} rows left out: {why}" for why, count in known.dropped.items())]
+        rows, vehicle, names = rows[known.rows], known.vehicle, known.names
+        same = vehicle[1:] == vehicle[:-1]
         if not same.any():
             raise NotEnoughDataError(f"{self.path}: no vehicle in two of {self.messages} messages")
         step = float(np.median(np.diff(rows[:, 1])[same]))
-        # an identifier that leaps is another vehicle from there on
-        moved, passed = np.hypot(*np.diff(rows[:, 2:4], axis=0).T), np.diff(rows[:, 1])
-        recent = np.fmax(rows[1:, 5], rows[:-1, 5])
-        leaps = same & np.isfinite(recent) & (moved > 2.0 * recent * passed + LEAP_DISTANCE)
-        new = np.r_[True, ~same | leaps]
-        vehicle, names, count = np.cumsum(new).astype(np.int64) - 1, list[str](), Counter[int]()
-        for number in rows[new, 0].astype(np.int64).tolist():
-            count[number] += 1
-            names.append(self.names[number] + (f"#{count[number]}" if count[number] > 1 else ""))
-        if leaps.any():
-            notes.append(f"{int(leaps.sum())} leaps of a vehicle: another one from there on (NAME#2 ...)")
         hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
         if len(hosts) > 1:
             notes.append(f"several host vehicles: {', '.join(hosts)}")
@@ -321,10 +308,14 @@ class _Collected:
         usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
         heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, time, step))
         speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, time, step))
-        arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
+        sides = zip(rear, axes(heading, pitch, roll), strict=True)
+        arm = np.sum([part[:, None] * axis for part, axis in sides], axis=0)
         length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
         when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
-        tracks = Tracks(tuple(names), vehicle, *when, *place, speed, length, kinds, rear=behind)
+        tracks = Tracks(
+            names, vehicle, *when, *place, speed, length, kinds, rear=behind, recording=known.recording,
+            recordings=known.recordings, dropped=known.dropped,
+        )  # fmt: skip
         numbers = {name: str(number) for number, name in self.names.items()}
         return Recorded(tracks, self.things, hosts, numbers, notes)
 

@@ -75,7 +75,8 @@ def reconstruct(
     FormatError, NotEnoughDataError
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
-    traffic = read_recording(Path(recording), kind=settings.format, road=settings.road, columns=columns)
+    kind, road, case = settings.format, settings.road, settings.case
+    traffic = read_recording(Path(recording), kind=kind, road=road, columns=columns, recording=case)
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -133,9 +134,22 @@ def facts_of(made: Reconstruction) -> dict[str, Any]:
         "vehicles": vehicle_rows(plans, made.drivers),
         "maneuvers": maneuver_rows(plans, made.relative),
         "encounters": encounter_rows(made.encounters),
+        "rows": rows_of(made),
+        "inferred": {name: [list(gap) for gap in gaps] for name, gaps in recording.inferred.items()},
         "not_expressed": [*made.traffic.notes, *not_expressed(plans, recording.left_out)],
         "provenance": {"package_version": __version__, "inputs": parsed_hashes(made.files)},
     }
+
+
+def rows_of(made: Reconstruction) -> dict[str, int]:
+    """Rows of the recording's file by what became of them: they add up to all of it."""
+    traffic = made.traffic
+    thinned = max(traffic.read - sum(len(track.time) for track in traffic.tracks), 0)
+    there = sum(made.recording.rows.values())
+    others = sum(len(track.time) for track in traffic.tracks) - there
+    counts = Counter(made.recording.rows) + Counter(traffic.dropped)
+    counts += Counter({"thinned to 0.1 s": thinned, "of vehicles that were not asked for": others})
+    return dict(sorted(counts.items()))
 
 
 def summary(plans: Sequence[VehiclePlan], duration: float) -> dict[str, float]:

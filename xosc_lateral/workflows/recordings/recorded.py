@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
+from xosc_lateral.drivers.drives.identity import LONGEST_BRIDGE, LONGEST_GAP, leaps
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
 
 MARKING_TOLERANCE = 1.0  # so far beside every driving lane a vehicle still keeps to one: it drives on its marking [m]
-LONGEST_GAP = 1.0  # rows farther apart than this are not of one passage, as in `recordings.cuts` [s]
 MAXIMUM_COORDINATE = 1e8  # no map projection gives such a position: the Earth's circumference is 4e7 m [m]
 SHORTEST_STEP = 1e-4  # rows that follow sooner are of the same moment: no sensor has 10 kHz [s]
 MINIMUM_PASSAGE = 2.0  # passages below this are left out: a speed and its change can't be told in less [s]
-LEAP_DISTANCE = 1.5  # farther than it can have driven (half a narrow lane): the identifier is another vehicle's now [m]
+MINIMUM_BRIDGE = 2.0  # a gap is bridged where rows are farther apart than this many usual steps [-]
 BACKWARDS_DISTANCE = 0.5  # who falls back so far drives backwards; less is an error of standing vehicles' positions [m]
 MOVING_SPEED = 0.25  # below, a vehicle stands, and its direction is that of errors: half a walking pace [m/s]
 VELOCITY_WINDOW = 2.0  # rows whose positions a velocity is fitted to: 0.2 m of noise at 10 Hz are 0.08 m/s in it [s]
@@ -34,6 +36,9 @@ class Recording:
     left_out: tuple[str, ...]
     start: float  # start, end: of the window [s]
     end: float
+    rows: Mapping[str, int] = field(default_factory=dict)  # recorded rows by what became of them
+    inferred: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    # by vehicle, from when to when nobody saw it, and its path was bridged [s from the window's start]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,32 +69,43 @@ def own_lateral(vehicle: EntityMotion) -> tuple[FloatArray, FloatArray, IntArray
 
 def place_tracks(tracks: Sequence[RecordedTrack], network: RoadNetwork, start: float, end: float) -> Recording:
     """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
-    vehicles, left_out = list[EntityMotion](), list[str]()
+    vehicles, left_out, counts = list[EntityMotion](), list[str](), Counter[str]()
+    inferred = dict[str, tuple[tuple[float, float], ...]]()
     for track in tracks:
         inside = (np.hypot(track.x, track.y) < MAXIMUM_COORDINATE) & np.isfinite(track.heading)
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
+        counts["outside the window, or nowhere"] += len(track.time) - len(rows)
         if len(rows):
-            rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
-            vehicle = _place(track, rows, network, left_out, start)
-            if vehicle is not None:
+            apart = np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]
+            counts["repeated time"] += int((~apart).sum())
+            placed = _place(track, rows[apart], network, left_out, start, counts)
+            if placed is not None:
+                vehicle, bridged = placed
                 vehicles.append(vehicle)
+                gaps = tuple(
+                    (float(vehicle.time[p.start]), float(vehicle.time[p.stop - 1])) for p in true_slices(bridged)
+                )
+                inferred |= {track.name: gaps} if gaps else {}
     if not vehicles:
         why = f": {left_out[0]}" if left_out else ""
         raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
-    return Recording(tuple(vehicles), tuple(left_out), start, end)
+    rows_of = {reason: count for reason, count in counts.items() if count}
+    return Recording(tuple(vehicles), tuple(left_out), start, end, rows_of, inferred)
 
 
 def _place(
-    track: RecordedTrack, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str], start: float
-) -> EntityMotion | None:
-    time, x, y = track.time[rows], track.x[rows], track.y[rows]
+    track: RecordedTrack, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str], start: float,
+    counts: Counter[str],
+) -> tuple[EntityMotion, BoolArray] | None:  # fmt: skip
+    time, x, y, heading, inferred = _bridged(track, rows)
     velocity = np.stack([_slope(time, x), _slope(time, y)])
-    heading = _steady_heading(time, x, y, velocity, track.heading[rows], network)
+    heading = _steady_heading(time, x, y, velocity, heading, network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     nearest = network.world_to_lane(x, y, heading=heading)
     on_lane = (nearest.distance <= MARKING_TOLERANCE) & (nearest.lane != 0)
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
+        counts["off the lanes"] += len(rows)
         return None
     lane_heading, width, there = np.zeros(len(x)), np.full(len(x), np.nan), np.flatnonzero(on_lane)
     place = nearest.road[there], nearest.lane[there], nearest.s[there]
@@ -101,24 +117,33 @@ def _place(
     is_back = driven < np.maximum.accumulate(driven) - BACKWARDS_DISTANCE
     elsewhere = on_lane & (is_across | is_back)
     passages = _passages(time, x, y, np.flatnonzero(on_lane & ~elsewhere))
-    reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
+    seen = ~inferred
+    reasons = {
+        "off the lanes": int((~on_lane & seen).sum()),
+        "across a lane or backwards": int((elsewhere & seen).sum()),
+    }
+    best = max(passages, key=lambda part: time[part[-1]] - time[part[0]], default=np.zeros(0, dtype=np.intp))
+    kept = int(seen[best].sum())
+    lost = len(rows) - kept
+    reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
+    counts.update({"kept": kept, **{why: max(count, 0) for why, count in reasons.items()}})
+    said = ", ".join(f"{count} {why}" for why, count in reasons.items() if count > 0)
     if not passages:
-        counts = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
-        left_out.append(f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap{counts}")
+        head = f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap"
+        left_out.append(f"{head}; of {len(rows)} rows {said}")
         return None
-    best = max(passages, key=lambda part: time[part[-1]] - time[part[0]])
-    lost = len(time) - len(best)
     if lost:
-        reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
-        counts = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
-        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {counts}")
+        left_out.append(f"{track.name}: {lost} of {len(rows)} rows: {said}")
+    if inferred[best].any():
+        left_out.append(f"{track.name}: {int(inferred[best].sum())} rows are inferred: nobody saw it for up to 4 s")
     moments, x, y, turned = time[best] - start, x[best], y[best], np.where(way[best] < 0, np.pi, 0.0)
     step = np.maximum(np.gradient(moments), 1e-6)
-    return EntityMotion.of(
+    motion = EntityMotion.of(
         track.entity, moments, x=x, y=y, heading=lane_heading[best] + turned, heading_relative=turned,
         speed=np.hypot(np.gradient(x) / step, np.gradient(y) / step), road=nearest.road[best], lane=nearest.lane[best],
         s=nearest.s[best], offset=nearest.offset[best], lane_width=width[best],
     )  # fmt: skip
+    return motion, inferred[best]
 
 
 def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -162,19 +187,39 @@ def _steady_heading(
     return np.asarray(np.angle(mean))
 
 
+def _bridged(
+    track: RecordedTrack, rows: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Time, x, y and heading of the rows, with what lies between two where nobody saw the vehicle for a while and it
+    came back where its speed leads; and which are inferred so. Shape (m,)."""
+    time, x, y, heading = (values[rows] for values in (track.time, track.x, track.y, track.heading))
+    inferred = np.zeros(len(rows), dtype=np.bool_)
+    if len(rows) < 4:
+        return time, x, y, heading, inferred
+    step = np.diff(time)
+    usual = float(np.median(step))
+    gaps = (step > MINIMUM_BRIDGE * usual) & (step > LONGEST_GAP) & (step <= LONGEST_BRIDGE) & ~leaps(time, x, y)
+    if not gaps.any():
+        return time, x, y, heading, inferred
+    from scipy.interpolate import CubicHermiteSpline
+
+    parts = np.split(np.arange(len(rows)), np.flatnonzero(step > LONGEST_GAP) + 1)
+    velocity = np.concatenate([np.stack([_slope(time[p], x[p]), _slope(time[p], y[p])]) for p in parts], axis=1)
+    new = []
+    for k in np.flatnonzero(gaps).tolist():
+        at = time[k] + usual * np.arange(1, int(np.ceil(step[k] / usual - 1e-6)))
+        ends = [k, k + 1]
+        path = CubicHermiteSpline(time[ends], np.stack([x[ends], y[ends]], axis=1), velocity[:, ends].T)
+        turn = np.unwrap(heading[ends])
+        new.append(np.column_stack([at, path(at), np.interp(at, time[ends], turn)]))
+    added = np.concatenate(new)
+    order = np.argsort(np.r_[time, added[:, 0]], kind="stable")
+    time, x, y, heading = (np.r_[old, added[:, k]][order] for k, old in enumerate((time, x, y, heading)))
+    return time, x, y, heading, (order >= len(rows))
+
+
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Stretches of the rows without a gap or a leap, `MINIMUM_PASSAGE` at least: a bad row or two end none."""
-    from scipy.ndimage import median_filter
-
-    step = np.maximum(np.diff(time[rows]), 1e-9)
-    broken = step > LONGEST_GAP
-    if len(step):
-        moved = np.diff(x[rows]), np.diff(y[rows])
-        vx, vy = (median_filter(each / step, 5, mode="nearest") for each in moved)
-        about = np.maximum(np.hypot(vx, vy), 1.0)
-        across = (moved[1] * vx - moved[0] * vy) / about
-        # twice as far as about that time, or turned by more than 30 degrees
-        broken |= np.hypot(*moved) > 2.0 * about * step + LEAP_DISTANCE
-        broken |= np.abs(across) > 0.5 * about * step + LEAP_DISTANCE
+    broken = (np.diff(time[rows]) > LONGEST_GAP) | leaps(time[rows], x[rows], y[rows])
     parts = np.split(rows, np.flatnonzero(broken) + 1)
     return [part for part in parts if len(part) > 3 and time[part[-1]] - time[part[0]] >= MINIMUM_PASSAGE]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -53,6 +53,9 @@ class RecordedTraffic:
     sources: tuple[Path, ...]  # what was read
     notes: tuple[str, ...] = field(default=())
     host: str | None = None  # vehicle that the recording calls its host
+    label: str = ""  # of this one of several in a file
+    dropped: Mapping[str, int] = field(default_factory=dict)  # rows of the file that are in no track, by reason
+    read: int = 0  # rows that tracks were made from, before they were thinned
 
     @property
     def span(self) -> tuple[float, float]:
@@ -61,22 +64,43 @@ class RecordedTraffic:
 
 
 def read_recording(
-    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None
-) -> RecordedTraffic:
-    """Read a recording. `kind`: one of `READERS`, else told from the name. `road`: OpenDRIVE. `columns`: of tables."""
+    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None,
+    recording: str | None = None,
+) -> RecordedTraffic:  # fmt: skip
+    """Read a recording, see `read_recordings`. Raises `FormatError`: the file holds several, and none is named."""
+    every = read_recordings(source, kind=kind, road=road, columns=columns, recording=recording)
+    if len(every) > 1:
+        labels = ", ".join(traffic.label for traffic in every[:8])
+        raise FormatError(f"{len(every)} recordings ({labels}): name one with --case", path=source)
+    return every[0]
+
+
+def read_recordings(
+    source: Path, *, kind: str | None = None, road: Path | None = None, columns: MappingLike | None = None,
+    recording: str | None = None,
+) -> list[RecordedTraffic]:  # fmt: skip
+    """Every recording of a file, or the one that is named, who was there at once in each.
+
+    `kind`: one of `READERS`, else told from the name. `road`: OpenDRIVE. `columns`: of tables.
+    """
     kind = kind or format_of(source)
-    if kind not in READERS:
-        raise FormatError(f"no recording format {kind!r}; there are {', '.join(READERS)}", path=source)
+    if kind not in (*READERS, "tracks"):
+        raise FormatError(f"no recording format {kind!r}; there are {', '.join((*READERS, 'tracks'))}", path=source)
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
-        traffic = READERS[kind](source, road, as_mapping(columns))
-    names = (composed(track.name) for track in traffic.tracks)
-    tracks = tuple(
-        replace(track, name=name, entity=structs.replace(track.entity, name=name))
-        for track, name in zip(traffic.tracks, names, strict=True)
-    )
-    return replace(traffic, tracks=tracks, host=composed(traffic.host))
+        if kind == "tracks":
+            every = _tracks(source, road, as_mapping(columns), recording)
+        else:
+            every = [READERS[kind](source, road, as_mapping(columns))]
+    return [
+        replace(traffic, tracks=tuple(map(_composed, traffic.tracks)), host=composed(traffic.host)) for traffic in every
+    ]
+
+
+def _composed(track: RecordedTrack) -> RecordedTrack:
+    name = composed(track.name)
+    return replace(track, name=name, entity=structs.replace(track.entity, name=name))
 
 
 def format_of(source: Path) -> str:
@@ -94,8 +118,9 @@ def format_of(source: Path) -> str:
 
 
 # ---- tracks on a known road, or on the recording's own lanes ---------------------------------------------------------
-def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
-    return _on_road(read_tracks(source, mapping=columns), source, road)
+def _tracks(source: Path, road: Path | None, columns: TableMapping, wanted: str | None = None) -> list[RecordedTraffic]:
+    every = read_tracks(source, mapping=columns).of_recording(wanted, source)
+    return [_on_road(tracks, source, road) for tracks in every]
 
 
 def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -149,7 +174,20 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
-    return RecordedTraffic(name_of(source), vehicles, network, data, road_name, sources, notes)
+    label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""
+    return RecordedTraffic(
+        name_of(source),
+        vehicles,
+        network,
+        data,
+        road_name,
+        sources,
+        (*tracks.notes, *notes),
+        host=None,
+        label=label,
+        dropped=tracks.dropped,
+        read=len(tracks.x),
+    )
 
 
 def _vehicles(tracks: Tracks) -> tuple[tuple[RecordedTrack, ...], tuple[str, ...]]:
@@ -221,14 +259,14 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     recording = levelx.Recording.read(files[0])
     table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
     if recording.is_exid:
-        kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
+        kinds = recording.classes(meta.set_index("trackId").reindex(table["trackId"]))
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
     recording.require(levelx.HIGHD_COLUMNS)
     lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
     table = table.sort_values(["id", "frame"], ignore_index=True)
     meta = meta.set_index("id").loc[table["id"]]
-    kind = meta["class"].astype(str).str.lower().to_numpy(dtype=str)
+    kind = recording.classes(meta)
     is_ahead = meta["drivingDirection"].to_numpy() == 2
     vehicle, ids = table["id"].factorize()
     time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
@@ -276,5 +314,5 @@ def dlr_road(lanes: dlr_ht.Carriageways) -> WrittenRoad:
 
 
 READERS: dict[str, Callable[[Path, Path | None, TableMapping], RecordedTraffic]] = {
-    "dlr-ht": _dlr, "levelx": _levelx, "tracks": _tracks, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
+    "dlr-ht": _dlr, "levelx": _levelx, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
 }  # fmt: skip

@@ -37,6 +37,8 @@ class ReconstructSettings:
     road: Path | None = option(
         None, Path, kind=Path | None, show_default=False,
         help="OpenDRIVE file, or SUMO network, that it was recorded on.")
+    case: str | None = option(
+        None, str, kind=str | None, metavar="NAME", show_default=False, help="Which of several recordings in a file.")
     begin: float | None = option(None, float, "--from", kind=float | None, show_default=False, help="Begin there [s].")
     end: float | None = option(None, float, "--to", kind=float | None, show_default=False, help="End there [s].")
     vehicles: frozenset[str] | None = option(
@@ -65,6 +67,7 @@ class ReconstructKeywords(TypedDict, total=False):
 
     format: str | None
     road: PathLike | None
+    case: str | None
     begin: float | None
     end: float | None
     vehicles: Collection[str] | None

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from xosc_lateral.base import vehicle_classes
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.vehicle_classes import class_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import VehicleCategory
@@ -31,7 +33,7 @@ two. [s]"""
 ROWS_TOGETHER = 100_000
 """Rows of all others that are looked at together: as many as stay in a processor's cache. [-]"""
 
-TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
+TRUCKS = frozenset(category for category in VehicleCategory if class_of(category) in vehicle_classes.TRUCKS)
 
 
 class Surroundings:

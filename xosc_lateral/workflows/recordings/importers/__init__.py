@@ -152,11 +152,16 @@ class ImportedDrives(Result):
 
 # ---- what importers make ---------------------------------------------------------------------------------------------
 def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **about: Any) -> ImportedDrives:
-    """A table with a column `state` and rows `step` seconds apart, and its record; `about`: what can't be counted."""
+    """A table with a column `state` and rows `step` seconds apart, and its record; `about`: what can't be counted.
+
+    `dropped` in it: rows of the source that are not in the table, by reason.
+    """
+    states = table["state"].value_counts()
+    counts = Counter({str(state): int(count) for state, count in states.items()}) + Counter(about.pop("dropped", {}))
     record = ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
-        rows={str(state): int(count) for state, count in table["state"].value_counts().sort_index().items()},
+        rows=dict(sorted(counts.items())),
         vehicles=int(table["drive"].nunique()),
         hours=round(float((table["state"] == KEPT_ROWS).sum()) * step / 3600.0, 3),
         **about,

@@ -18,6 +18,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.vehicle_classes import class_of
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
@@ -98,7 +99,7 @@ def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
                 rows.append((len(names), state.time_step, *position, getattr(state, "orientation", np.nan), speed))
         names.append(f"{label}:{obstacle.obstacle_id}")
         lengths.append(float(getattr(obstacle.obstacle_shape, "length", 4.6)))
-        kinds.append(str(obstacle.obstacle_type.value).lower())
+        kinds.append(class_of(obstacle.obstacle_type.value) or "")
     if len(rows) < 2:
         raise NotEnoughDataError(f"{path}: no obstacle with a recorded trajectory")
     values = np.array(rows, dtype=np.float64)

@@ -20,6 +20,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.vehicle_classes import ON_ROADS, TRUCKS, class_named
 from xosc_lateral.files import sumo
 from xosc_lateral.files.columns import require_row_step
 from xosc_lateral.workflows.options import flag
@@ -92,7 +93,7 @@ def _drive_table(
     time, side, speed = (rows[name].to_numpy() for name in ("time", "side", "speed"))
     kinds = [types.get(kind.partition("@")[0], (sumo.usual_length(kind), kind)) for kind in rows["kind"]]
     length = np.array([size for size, _ in kinds])
-    is_truck = np.array([any(word in kind.lower() for word in sumo.TRUCKS) for _, kind in kinds])
+    is_truck = np.array([class_named(kind) in TRUCKS for _, kind in kinds])
     # lanes of an edge lie side by side, counted from the right here
     numbers, following = _driving_lanes(net)
     edges: dict[str, list[int]] = {}
@@ -192,7 +193,7 @@ def read_fcd(path: Path) -> Tracks:
     same = vehicle[1:] == vehicle[:-1]
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
-    kind = np.array(["truck" if any(word in name for word in sumo.TRUCKS) else "" for name in types])[vehicle]
+    kind = np.array([name if (name := class_named(word)) in ON_ROADS else "" for word in types])[vehicle]
     length = np.array([sumo.usual_length(name) for name in types])[vehicle]
     heading = 0.5 * np.pi - np.radians(angle)
     for part in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):

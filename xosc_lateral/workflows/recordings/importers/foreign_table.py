@@ -12,9 +12,10 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.vehicle_classes import TRUCKS, class_of
 from xosc_lateral.files.columns import comma_numbers
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
-from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
+from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, parts_of
 from xosc_lateral.files.tables import read_table, text_encoding
 from xosc_lateral.workflows.recordings.importers import paths_of
 
@@ -59,8 +60,6 @@ COMPOUND = re.compile(
 )
 """What means the offset, as one word."""
 
-TRUCKS = re.compile(r"truck|lorry|lkw|bus|semi|trailer|hgv|sattel", re.IGNORECASE)
-
 BY_SIZE = {
     "speed": ((60.0, 250.0, "km/h"),),
     "lane_width": ((200.0, 700.0, "cm"), (2000.0, 7000.0, "mm")),
@@ -99,7 +98,7 @@ def propose_mapping(files: Sequence[Path]) -> str:
     values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
     headers: dict[str, str] = {}
     for header in shared:
-        bare, _ = _parts_of(header)
+        bare, _ = parts_of(header)
         placed = _place_named(bare)
         known = {} if set(bare.split("_")) & SATELLITE else HEADERS
         spellings = bare, bare.partition("_")[2] or "-"  # whole, and without a word before it
@@ -128,21 +127,6 @@ def propose_mapping(files: Sequence[Path]) -> str:
     return "\n".join(lines)
 
 
-def _parts_of(header: str) -> tuple[str, str]:
-    """A header without its unit, in lower case, and the unit; empty where it names none."""
-    match = re.fullmatch(r"(.+?)[ _]*[\[(]([^\])]+)[\])]", header)
-    if match and spelled(match[2]):
-        return _plain(match[1]), str(spelled(match[2]))
-    stem, _, last = header.rpartition("_")
-    unit = spelled(last) if stem else None
-    return (_plain(stem), unit) if unit and unit != "-" else (_plain(header), "")
-
-
-def _plain(text: str) -> str:
-    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text)
-    return re.sub(r"[\s.:\-_/]+", "_", spaced).strip("_").lower()
-
-
 def _place_named(bare: str) -> str | None:
     """Offset or distance to a marking, by a header's words; at most one of them may be of the system's own."""
     words = set(bare.split("_"))
@@ -159,7 +143,7 @@ def _place_named(bare: str) -> str | None:
 
 
 def _line(name: str, header: str, column: pd.Series) -> str:
-    _, unit = _parts_of(header)
+    _, unit = parts_of(header)
     why = "by its header"
     if unit:
         try:
@@ -191,7 +175,7 @@ def _texts(name: str, column: pd.Series) -> list[str]:
     texts = sorted({str(cell).strip() for cell in column.dropna()})
     if name == "time" or len(texts) > LISTED_TEXTS:
         return []
-    numbers = {text: int(bool(TRUCKS.search(text))) if name == "is_truck" else k for k, text in enumerate(texts)}
+    numbers = {text: int(class_of(text) in TRUCKS) if name == "is_truck" else k for k, text in enumerate(texts)}
     return ["", f"[values.{name}]", *(f"{_quoted(text)} = {number}" for text, number in numbers.items())]
 
 

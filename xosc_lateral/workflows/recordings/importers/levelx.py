@@ -18,8 +18,9 @@ References
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,9 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
+from xosc_lateral.drivers.drives.identity import identify
+from xosc_lateral.files.mapping import classes_of
 from xosc_lateral.files.tables import read_table
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
@@ -43,8 +47,6 @@ EXID_COLUMNS = (
     *("latLaneCenterOffset", "laneWidth", "laneletId", "laneChange", "leadId", "leadDHW"),
     *("leftLeadId", "leftRearId", "leftAlongsideId", "rightLeadId", "rightRearId", "rightAlongsideId"),
 )
-TRUCKS = ("truck", "bus")
-VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 
 @importer
@@ -53,15 +55,16 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> Importe
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
-    parts, layouts, steps = [], set[str](), set[float]()
+    parts, layouts, steps, dropped = [], set[str](), set[float](), Counter[str]()
     for path in files:
         recording = Recording.read(path)
         layouts.add("exiD" if recording.is_exid else "highD")
         steps.add(1.0 / recording.frame_rate)
         parts.append((_from_exid if recording.is_exid else _from_highd)(recording, settings))
+        dropped += recording.dropped
     if len(layouts) > 1 or len(steps) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
-    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings)}
+    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings), "dropped": dropped}
     return imported(pd.concat(parts, ignore_index=True), sources=files, step=steps.pop(), **about)
 
 
@@ -73,6 +76,7 @@ class Recording:
     tracks: pd.DataFrame
     meta: pd.DataFrame
     about: pd.DataFrame
+    dropped: Counter[str] = field(default_factory=Counter)  # rows by the reason why they are in no drive
 
     @classmethod
     def read(cls, path: Path) -> Recording:
@@ -86,7 +90,7 @@ class Recording:
             tables.append(read_table(file))
             if tables[-1].empty:
                 raise NotEnoughDataError(f"{file}: has no rows")
-        return cls(path, *tables)
+        return cls(path, tables[0], tables[1], tables[2])
 
     @property
     def number(self) -> str:
@@ -115,6 +119,22 @@ class Recording:
             raise FormatError(f"no value of {column} in the recording's meta file", path=self.path)
         return str(self.about[column].iloc[0])
 
+    def classes(self, meta: pd.DataFrame) -> NDArray[np.str_]:
+        """Of the rows of `meta`, in the package's words."""
+        return classes_of(meta["class"].astype(str), self.path, "class").to_numpy(dtype=str)
+
+    def identified(self, name: str, x: str, y: str) -> pd.DataFrame:
+        """Rows by vehicle and time, with `vehicle`, and its `name`; see `dropped`."""
+        codes, labels = self.tracks[name].factorize(sort=True)
+        time, east, north = (self.tracks[column].to_numpy(dtype=np.float64) for column in ("frame", x, y))
+        try:
+            known = identify([str(label) for label in labels], codes, time / self.frame_rate, east, north)
+        except ValueError as error:
+            raise FormatError(str(error), path=self.path) from error
+        self.dropped.update(known.dropped)
+        names = np.array(known.names, dtype=object)[known.vehicle]
+        return self.tracks.iloc[known.rows].reset_index(drop=True).assign(vehicle=known.vehicle, name=names)
+
     def require(self, columns: Sequence[str]) -> None:
         """Refuse tracks that lack a column."""
         if missing := [name for name in columns if name not in self.tracks.columns]:
@@ -123,7 +143,7 @@ class Recording:
 
 def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
     recording.require(HIGHD_COLUMNS)
-    step, tracks = 1.0 / recording.frame_rate, recording.tracks.sort_values(["id", "frame"], ignore_index=True)
+    step, tracks = 1.0 / recording.frame_rate, recording.identified("id", "x", "y")
     meta = recording.meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
     way = np.where(rightwards, 1.0, -1.0)
@@ -142,12 +162,12 @@ def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
         offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
         width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
     lane_number, frame = lane.astype(np.int64), tracks["frame"].to_numpy()
-    kind = meta["class"].astype(str).str.lower().to_numpy()
-    is_truck, instant, length = np.isin(kind, TRUCKS), frame * 2 + rightwards, tracks["width"].to_numpy()
+    kind = recording.classes(meta)
+    is_truck, instant, length = np.isin(kind, list(TRUCKS)), frame * 2 + rightwards, tracks["width"].to_numpy()
     on_left, on_right = lane_number < count - 1, lane_number > 0
     near = find_neighbours(instant, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
     columns = {
-        "drive": f"highd-{recording.number}-" + tracks["id"].astype(str),
+        "drive": f"highd-{recording.number}-" + tracks["name"],
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,
@@ -157,17 +177,16 @@ def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
         "lane_count": count.astype(np.int64),
         **near,
     }
-    rows, reasons = Rows(tracks["id"].to_numpy(), frame * step, lane_number, step), {"no lane": lane_number < 0}
+    rows, reasons = Rows(tracks["vehicle"].to_numpy(), frame * step, lane_number, step), {"no lane": lane_number < 0}
     return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
 
 
 def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
     recording.require(EXID_COLUMNS)
-    step, tracks = 1.0 / recording.frame_rate, recording.tracks.sort_values(["trackId", "frame"], ignore_index=True)
-    classes = recording.meta.set_index("trackId").reindex(tracks["trackId"])["class"]
-    kind = classes.astype(str).str.lower().to_numpy()
+    step, tracks = 1.0 / recording.frame_rate, recording.identified("trackId", "xCenter", "yCenter")
+    kind = recording.classes(recording.meta.set_index("trackId").reindex(tracks["trackId"]))
     offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
-    vehicle, frame = tracks["trackId"].to_numpy(), tracks["frame"].to_numpy()
+    vehicle, frame = tracks["vehicle"].to_numpy(), tracks["frame"].to_numpy()
     known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
     # A new lane shows as a step of the offset; lanelets that follow one another along the road don't.
     step_of_offset = np.diff(offset, prepend=offset[:1])
@@ -176,9 +195,9 @@ def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
     lane = np.cumsum(jump).astype(np.int64)
     lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
     offset = offset * _left_sign(lateral, tracks, vehicle, step, recording.path)
-    is_truck = np.isin(kind, TRUCKS)
+    is_truck = np.isin(kind, list(TRUCKS))
     columns = {
-        "drive": f"exid-{recording.number}-" + tracks["trackId"].astype(str),
+        "drive": f"exid-{recording.number}-" + tracks["name"],
         "time": np.round(frame * step, 4),
         "offset": offset,
         "lane_width": width,
@@ -186,7 +205,10 @@ def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
         "acceleration": tracks["lonAcceleration"].to_numpy(),
         **_exid_neighbours(tracks, is_truck),
     }
-    rows, reasons = Rows(vehicle, frame * step, lane, step), {"no vehicle": ~np.isin(kind, VEHICLES), "no lane": ~known}
+    rows, reasons = (
+        Rows(vehicle, frame * step, lane, step),
+        {"no vehicle": ~np.isin(kind, list(DRIVEN)), "no lane": ~known},
+    )
     return cut_table(columns, rows, settings, sideways=lateral, reasons=reasons, kind=kind, is_truck=is_truck)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +15,50 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.files.columns import chosen_rows, listed, numbers_of, require_row_step, seconds_of_stamps
-from xosc_lateral.files.mapping import UNITS, ColumnSource, MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.base.vehicle_classes import ON_ROADS
+from xosc_lateral.drivers.drives.identity import apart_in_time, identify
+from xosc_lateral.files.columns import (
+    as_word,
+    chosen_rows,
+    epoch_factor,
+    listed,
+    numbers_of,
+    require_row_step,
+    seconds_of_stamps,
+)
+from xosc_lateral.files.mapping import (
+    UNITS,
+    MappingLike,
+    TableMapping,
+    as_mapping,
+    parse_map,
+    plain_header,
+    standard_sources,
+)
 from xosc_lateral.files.output_tables import COLUMNS
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.cuts import MOVING_SPEED, require_headings
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
-    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
-    "time": ("time", "timestamp", "t"),
-    "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
-    "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
+    "recording": (
+        *("recording", "recording_id", "case_id", "scenario_id", "scene_id", "sequence_id", "log_id", "location"),
+        *("episode_id", "run_index", "run_id"),
+    ),
+    "vehicle": ("vehicle", "id", "track_id", "vehicle_id", "object_id", "agent_id", "car_id", "track", "drive"),
+    "time": ("time", "timestamp", "t", "global_time", "timestamp_seconds", "sim_time"),
+    "x": ("x", "x_center", "center_x", "easting", "center_easting", "pos_x", "position_x", "car_center_x"),
+    "y": ("y", "y_center", "center_y", "northing", "center_northing", "pos_y", "position_y", "car_center_y"),
     "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
     "speed": ("speed", "velocity", "v"),
     "length": ("length", "vehicle_length", "dimension_length"),
     "width": ("width", "vehicle_width", "dimension_width"),
     "rear": ("rear",),
-    "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
+    "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type", "vehicle_type", "object_category"),
 }
-"""Name -> headers that are understood, in lower case, the first that is there; others by the map."""
+"""Name -> headers that are understood, as `plain_header` has them, the first that is there; others by the map."""
+
+FRAMES = ("frame", "frame_id", "frame_num", "frame_number", "timestep", "time_step")  # counts, of a rate not in them
 
 STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
 """What a table of states has, whether `play` or `live` wrote it; its positions are those of reference points."""
@@ -63,6 +88,33 @@ class Tracks:
     is_reference: bool = False  # positions are those of the reference point, as `play` writes them, not of the middle
     rear: FloatArray | None = None  # how far x and y lie behind the vehicle's middle; None: they are the middle [m]
     height: FloatArray | None = None
+    recording: IntArray | None = None  # number of the recording that each row is of; None: all of one
+    recordings: tuple[str, ...] = ()
+    dropped: Mapping[str, int] = field(default_factory=dict)  # reason -> rows of the source that are not here
+    notes: tuple[str, ...] = ()
+
+    def clock(self) -> FloatArray:
+        """Times at which those of two recordings don't meet, shape (n,). [s]"""
+        return self.time if self.recording is None else apart_in_time(self.time, self.recording, self.step)
+
+    def of_recording(self, wanted: str | None, path: Path) -> list[Tracks]:
+        """Each recording alone, or the one that is wanted. Raises `FormatError`: there is none such."""
+        if wanted is not None and wanted not in self.recordings:
+            raise FormatError(f"no recording {wanted!r}; there are {listed(self.recordings) or 'none'}", path=path)
+        if self.recording is None or len(self.recordings) < 2:
+            return [self]
+        made = []
+        for number, label in enumerate(self.recordings):
+            mine = np.flatnonzero(self.recording == number)
+            if len(mine) and wanted in (None, label):
+                who, vehicle = np.unique(self.vehicle[mine], return_inverse=True)
+                arrays: dict[str, Any] = {
+                    name: values[mine] for name, values in vars(self).items()
+                    if isinstance(values, np.ndarray) and name not in ("vehicle", "recording")
+                }  # fmt: skip
+                names = tuple(self.names[k] for k in who.tolist())
+                made.append(replace(self, names=names, vehicle=vehicle, recording=None, recordings=(label,), **arrays))
+        return made
 
 
 MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
@@ -105,12 +157,22 @@ def tracks_of(
     is_played = set(map(str, table.columns)) >= STATE_COLUMNS
     if is_played:  # a table of states, as `play` and `live` write it
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
-    rows = _columns(table, path, saved, columns).sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
-    rows = rows.drop_duplicates(["vehicle", "time"], ignore_index=True)
-    codes, names = rows["vehicle"].factorize()
-    vehicle = codes.astype(np.int64)
+    rows, lost = _columns(table, path, saved, columns)
+    codes, labels = rows["vehicle"].factorize(sort=True)
     time, x, y = (rows[name].to_numpy(dtype=np.float64) for name in ("time", "x", "y"))
-    same = codes[1:] == codes[:-1]
+    time = time * epoch_factor(time)
+    order = np.lexsort((time, codes))
+    steps = np.diff(time[order])[(np.diff(codes[order]) == 0) & (np.diff(time[order]) > 0.0)]
+    if len(steps):  # in a wrong unit, all that moves leaps
+        require_row_step(float(np.median(steps)), path)
+    recording = list(rows["recording"]) if "recording" in rows else None
+    try:
+        known = identify(list(map(str, labels)), codes, time, x, y, recording)
+    except ValueError as error:
+        raise FormatError(str(error), path=path) from error
+    rows, vehicle, names = rows.iloc[known.rows], known.vehicle, known.names
+    time, x, y = (values[known.rows] for values in (time, x, y))
+    same = vehicle[1:] == vehicle[:-1]
     if not same.any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same]))
@@ -127,13 +189,16 @@ def tracks_of(
         _require_speed(speed, driven, path)
     kinds = np.full(len(rows), "")
     if "vehicle_class" in rows:
-        kinds = rows["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str)
+        kinds = rows["vehicle_class"].to_numpy(dtype=str)
     length = stated("length", np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds]))
     ahead = BEHIND_MIDDLE[saved.reference] * length
     when, place = (time - float(time.min()), step), (x + ahead * np.cos(heading), y + ahead * np.sin(heading), heading)
     width = rows["width"].to_numpy(dtype=np.float64) if "width" in rows else None
     rear = stated("rear", np.zeros(len(rows))) if "rear" in rows else None
-    return Tracks(tuple(map(str, names)), vehicle, *when, *place, speed, length, kinds, width, is_played, rear)
+    return Tracks(
+        names, vehicle, *when, *place, speed, length, kinds, width, is_played, rear, recording=known.recording,
+        recordings=known.recordings, dropped={**lost, **known.dropped}, notes=known.notes,
+    )  # fmt: skip
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
@@ -148,25 +213,33 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
-def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
+def _columns(
+    table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]
+) -> tuple[pd.DataFrame, dict[str, int]]:
+    """Columns under their names, and the rows that are not in them by reason."""
     mapping = {**saved.columns, **parse_map(words)}
+    if "class" in mapping:
+        mapping["vehicle_class"] = mapping.pop("class")
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
-    by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
+    by_name = standard_sources(table.columns, HEADERS, path)
     columns: dict[str, pd.Series] = {}
-    table = chosen_rows(table, saved.missing, saved.rows, path)
-    for name, headers in HEADERS.items():
-        usual = next((by_lower[header] for header in headers if header in by_lower), None)
-        source = mapping.get(name) or (None if usual is None else ColumnSource(usual))
+    read, table = len(table), chosen_rows(table, saved.missing, saved.rows, path)
+    for name in HEADERS:
+        source = mapping.get(name, by_name.get(name))
         if source is None or source.column not in table.columns:
             if name in mapping or name in ("vehicle", "time", "x", "y"):
                 what = f"no column {repr(name) if source is None else source.column}"
-                what = f"{what}; there are {listed(table.columns)} (translate with --map {name}=COLUMN)"
+                counts = [str(header) for header in table.columns if plain_header(str(header)) in FRAMES]
+                advice = f"{counts[0]}:1/25 s, where its rate is 25/s" if name == "time" and counts else "COLUMN"
+                what = f"{what}; there are {listed(table.columns)} (translate with --map {name}={advice})"
                 raise FormatError(what, path=path, line=1)
             continue
         column = table[source.column]
         if name == "vehicle":
             columns[name] = column
+        elif name == "recording":
+            columns[name] = column.map(as_word)
         elif name == "vehicle_class":
             columns[name] = saved.class_names(column, path)
         else:
@@ -175,8 +248,14 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
                 stamps = seconds_of_stamps(column, path, saved.time_zone, columns["vehicle"])
             numbers = numbers_of(column, path, name) * source.factor if stamps is None else stamps
             columns[name] = pd.Series(numbers, index=column.index)
-    made = pd.DataFrame(columns).replace([np.inf, -np.inf], np.nan)
-    return made.dropna(subset=["vehicle", "time", "x", "y"])
+    every = pd.DataFrame(columns).replace([np.inf, -np.inf], np.nan)
+    made = every.dropna(subset=["vehicle", "time", "x", "y"])
+    lost = {"not chosen": read - len(every), "no place or time": len(every) - len(made)}
+    if "vehicle_class" in made:
+        for word, rows in made["vehicle_class"].value_counts().items():
+            lost |= {} if word in ON_ROADS or not word else {str(word): int(rows)}
+        made = made[made["vehicle_class"].isin([*ON_ROADS, ""])]
+    return made, {reason: count for reason, count in lost.items() if count}
 
 
 # ---- logs of esmini --------------------------------------------------------------------------------------------------

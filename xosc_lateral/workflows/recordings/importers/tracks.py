@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.options import MAPPING, flag
@@ -38,7 +39,6 @@ from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
-TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
 INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 CURVATURE_WINDOW = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 FACING_STEP = 5.0  # of places at which lanes beside each other are compared: 2 mm off at R = 100 m [m]
@@ -159,15 +159,19 @@ def import_placed(
     table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    return imported(table, settings=asdict(settings), step=placed.tracks.step, **about)
+    tracks = placed.tracks
+    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes)))
+    return imported(
+        table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
+    )  # fmt: skip
 
 
 def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
     tracks, inside = placed.tracks, placed.piece >= 0
-    is_truck = np.isin(tracks.kind, TRUCKS)
+    is_truck = np.isin(tracks.kind, list(TRUCKS))
     middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
     near = neighbour_columns(
-        graph, placed.piece, middle, tracks.time, tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
+        graph, placed.piece, middle, tracks.clock(), tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
         scale=placed.scale,
     )  # fmt: skip
     # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
@@ -188,7 +192,8 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     }
     against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
     rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
-    reasons = {"no lane": ~inside, **({"against the lane": against & inside} if against.any() else {})}
+    reasons = {"no vehicle": ~np.isin(tracks.kind, ["", *DRIVEN]), "no lane": ~inside}
+    reasons |= {"against the lane": against & inside} if against.any() else {}
     return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)
 
 
