@@ -107,7 +107,7 @@ def name_time_beside(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
     for finding in selection.accepted:
         before = finding.term
-        if not isinstance(before, MeanTerm | SpreadTerm) or not search.coarse.lasts:
+        if not isinstance(before, MeanTerm | SpreadTerm):
             continue
         without = selection.without([before], "").final
         test = (StepTerm if isinstance(before, MeanTerm) else TimeSpreadTerm).test(search, without)

@@ -142,6 +142,8 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 else:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
+                    if test.own_way is not None:
+                        why = f"it changes within drives, in each in its own way (p = {test.own_way:.2g} for all alike)"
                     rejected[component] = Rejected(component, test.columns, test.p_value, why)
             if not passed:
                 break

@@ -21,6 +21,7 @@ class LoopSeed(IntEnum):
     SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
     BLOCKS = 9  # Half samples of the blocks.
     SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
+    CYCLE = 12  # White rows that the highest line of the spectrum is compared with.
     OMNIBUS = 13  # Rotations that what is left is compared with.
 
 

@@ -21,13 +21,14 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop import low_frequencies as low
 from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
+from xosc_lateral.drivers.loop.drives import MEAN_INFLATION, SPREAD_INFLATION, Pooled, own_time, slope_alike
+from xosc_lateral.drivers.loop.model import CLIP, Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms import spread
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, columns_on_size
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
+from xosc_lateral.drivers.loop.timeline import COARSE, MIN_DRIFT_S, MIN_VALID_S, Coarse
 from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
 
@@ -76,8 +77,11 @@ class StepTerm(_MeanByTime):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Step or smooth, whichever is likelier, each parameter at Schwarz's price (Annals of Statistics 6, 1978)."""
         coarse = fitted.coarse
-        if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
+        if any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
+        alike = mean_alike(fitted)
+        if not coarse.lasts:  # short drives say which way they go, one by one, and nothing of the form
+            return None if alike is None else Outcome(TimeMeanTerm(), (), alike.p_value)
         rows, whitener = low.slow_rows(fitted)
         moments = low.step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
@@ -87,7 +91,7 @@ class StepTerm(_MeanByTime):
         )
         p_value = low.mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
         if not len(moments):
-            return Outcome(TimeMeanTerm(), (), p_value)
+            return _unless_unlike(cls, search, fitted, alike, Outcome(TimeMeanTerm(), (), p_value))
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
         step = cls(low.moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
         smooth = low.smooth_probabilities(slow[:, 0], waves, low.ORDERS)
@@ -206,12 +210,14 @@ class TimeSpreadTerm(Term):
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """The slowest half cosines of the squares beside those that are a little quicker, by an F test."""
-        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+        alike_in_all = spread_alike(fitted)
+        if (not fitted.coarse.lasts and alike_in_all is None) or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
         known = search.cross_basis(columns_on_size(fitted))
         may_act, p_column = spread.what_a_column_may_do(search, fitted)
         columns = low.half_cosines_of(fitted.coarse, max(low.SPREAD_ORDERS))
+        least_s = MIN_DRIFT_S if alike_in_all is None else MIN_VALID_S
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             tested = []
@@ -220,7 +226,7 @@ class TimeSpreadTerm(Term):
                 constant = np.ones(valid.sum())
                 both[valid] = beside(orthonormal(np.column_stack([constant, known[valid]])), both[valid])
                 parts = (both[:, :1], both[:, 1:])
-                rows, basis = (low.low_frequencies(own, fitted.coarse, valid, low.SHORTEST_S) for own in parts)
+                rows, basis = (low.low_frequencies(own, fitted.coarse, valid, low.SHORTEST_S, least_s) for own in parts)
                 tests = low.smooth_probabilities(rows[:, 0], basis, low.SPREAD_ORDERS)
                 tested += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None
@@ -235,7 +241,7 @@ class TimeSpreadTerm(Term):
         if not slow and cls.passes(search, p_value, fitted):
             by_time = max(_priced(fitted, cls(order), order) for order in low.SPREAD_ORDERS)
             alike = _columns_as_likely(search, fitted, spread.SpreadTerm, by_time)
-        return Outcome(cls(slow=slow, alike=alike), (), p_value)
+        return _unless_unlike(cls, search, fitted, alike_in_all, Outcome(cls(slow=slow, alike=alike), (), p_value))
 
     def matches(self, other: Self) -> bool:
         """Whichever movement changes."""
@@ -276,6 +282,32 @@ class TimeSpreadTerm(Term):
         size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
         factor = float(np.exp(size))
         return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
+
+
+ALIKE = 0.05  # Level of the second question: does it change in every drive alike? [-]
+
+
+def mean_alike(fitted: Fitted) -> Pooled | None:
+    """Slope of the mean by time that all drives have in common [m/s]; None: fewer than three drives."""
+    rows, whitener = low.slow_rows(fitted)
+    return slope_alike(rows, whitener.rows(own_time(fitted.coarse)), fitted.coarse, MEAN_INFLATION)
+
+
+def spread_alike(fitted: Fitted) -> Pooled | None:
+    """The same of the logarithm of the spread. [1/s]"""
+    coarse, squares = fitted.coarse, spread.quick_squares(fitted)
+    problem = spread.of_squares(coarse, squares, spread.known_log_scale(fitted))
+    rows, column = (problem.whitener.rows(one) for one in (problem.series, own_time(coarse)))
+    pooled = slope_alike(rows, column, coarse, SPREAD_INFLATION)
+    clipped = np.minimum(squares.values, CLIP)[squares.valid]
+    unit = 0.5 * float(clipped.std() / max(float(clipped.mean()), 1e-300))  # of a square to that of a logarithm
+    return pooled and replace(pooled, size=unit * pooled.size, error=unit * pooled.error)
+
+
+def _unless_unlike(kind: type[Term], search: Search, fitted: Fitted, alike: Pooled | None, outcome: Outcome) -> Outcome:
+    """Something changes within drives; unless it does so in all of them alike, a profile can't say when."""
+    unlike = alike is not None and alike.p_value > ALIKE and kind.passes(search, outcome.p_value, fitted)
+    return replace(outcome, term=None, own_way=alike.p_value) if unlike and alike is not None else outcome
 
 
 def _named(form: str, others: tuple[str, ...], when: str) -> tuple[str, str]:
