@@ -13,12 +13,13 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop import held_out
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
 from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting
-from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms
+from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms, search_of
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
+from xosc_lateral.drivers.loop.shown import Shown, what_drives_show
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.between import between_shift
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_middle, join_drives
@@ -86,6 +87,7 @@ class LoopResult:
     remainder: Omnibus  # Whether any column predicts it.
     explained: Explained | None  # Of what columns can explain, on held-out blocks; None: nothing can be held out.
     scores: Scorecard  # The ten metrics.
+    shown: tuple[Shown, ...]  # What these drives can show.
     seed: int
 
     @property
@@ -170,9 +172,23 @@ def close_loop(
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         explained=_explained(setting, identified),
         remainder=check_remainder(selection.final, identified.quantities, root),
+        shown=tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
         scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
+
+
+def plan_loop(
+    drives: Sequence[Drive],
+    *,
+    seed: int,
+    excluded: Sequence[str] = (),
+    roles: Mapping[str, str] = MappingProxyType({}),
+) -> list[Shown]:
+    """What drives can show before any effect is sought: sizes that would be found with 80 % probability."""
+    coarse = Coarse.of(join_drives(drives))
+    usable, search = search_of(coarse, np.random.SeedSequence(seed), excluded, roles)
+    return what_drives_show(search, fit_model(coarse, ()), usable.not_tested, plan=True)
 
 
 def _that_helps(setting: Setting, identified: Identified, progress: Progress) -> tuple[Identified, HeldOut]:

@@ -41,6 +41,7 @@ class Pooled:
     error: float
     degrees: float  # Of freedom.
     drives: int  # That it rests on.
+    within: float = 1.0  # p-value of slopes of any kind, each drive's its own. [-]
 
     @property
     def p_value(self) -> float:
@@ -78,6 +79,8 @@ def own_time(coarse: Coarse) -> FloatArray:
 
 def slope_alike(rows: FloatArray, column: FloatArray, coarse: Coarse, inflation: float) -> Pooled | None:
     """Common slope of white rows on a white column, shape (n,), each less its drive's level; None: too few drives."""
+    from scipy.stats import f
+
     lasting = counted(coarse) > 0.0
     power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)[lasting]
     slopes = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[lasting] / np.maximum(power, 1e-300)
@@ -86,7 +89,9 @@ def slope_alike(rows: FloatArray, column: FloatArray, coarse: Coarse, inflation:
     mean = float(power @ slopes / power.sum())
     scatter = float(power @ np.square(slopes - mean))
     degrees = PRIOR_DRIVES + number - 1
-    return Pooled(mean, float(np.sqrt((PRIOR_DRIVES * inflation + scatter) / degrees / power.sum())), degrees, number)
+    error = float(np.sqrt((PRIOR_DRIVES * inflation + scatter) / degrees / power.sum()))
+    within = max(float(f.sf(power @ np.square(slopes) / number / inflation, number, PRIOR_DRIVES)), MINIMUM_P)
+    return Pooled(mean, error, degrees, number, within)
 
 
 def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled:

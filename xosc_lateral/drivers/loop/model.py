@@ -87,7 +87,7 @@ class Outcome:
     after: Fitted | None = None  # Fit with the term, where the test has made it.
     together: tuple[Term, ...] = ()  # Found with it, as one finding.
     instead_of: Term | None = None  # Whose place it takes.
-    own_way: float | None = None  # p-value of a change that drives share, where each changes in its own way.
+    own_way: float | None = None  # p-value of a change within drives, where each changes in its own way.
 
 
 class Term(ABC):

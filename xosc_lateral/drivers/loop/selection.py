@@ -84,13 +84,14 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Rejected:
-    """A candidate that did not pass; `was_found`: it was significant, and taken back."""
+    """A candidate that did not pass; `was_found`: it was significant, and taken back; `own_way`: each drive changes."""
 
     component: str
     columns: tuple[str, ...]
     p_value: float
     why: str
     was_found: bool = False
+    own_way: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +143,11 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 else:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
-                    if test.own_way is not None:
-                        why = f"it changes within drives, in each in its own way (p = {test.own_way:.2g} for all alike)"
-                    rejected[component] = Rejected(component, test.columns, test.p_value, why)
+                    if (own := test.own_way) is not None:
+                        why = (
+                            f"it changes within drives (p = {own:.1e}), in each in its own way, which no profile knows"
+                        )
+                    rejected[component] = Rejected(component, test.columns, test.p_value, why, own_way=own is not None)
             if not passed:
                 break
             p_value, new, test = min(passed, key=lambda candidate: candidate[0])

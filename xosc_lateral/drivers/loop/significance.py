@@ -65,6 +65,15 @@ def upper_tail(
     return max(min(p_value, COUNTED_DRAWS / independent), MINIMUM_P)
 
 
+def score_at(level: float, null: FloatArray) -> float:
+    """Score whose `upper_tail` is a level, by bisection; infinite without a null."""
+    low, high = (float(null.min()), float(null.max()) + 1e3) if len(null) else (np.inf, np.inf)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if upper_tail(middle, null) > level else (low, middle)
+    return high
+
+
 def effective_number(draws: FloatArray) -> float:
     """Independent draws that tell as much about a mean as these do, by their autocorrelation (Geyer 1992); 1 to n."""
     n = len(draws)

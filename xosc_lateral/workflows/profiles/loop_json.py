@@ -13,6 +13,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.loop.selection import Gain
+from xosc_lateral.drivers.loop.shown import Shown
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
@@ -52,6 +53,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
             for item in result.identified.selection.rejected
         ],
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
+        "shown": shown_records(result.shown),
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
         "explained": known
@@ -80,6 +82,11 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         },
         "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
     }
+
+
+def shown_records(shown: Sequence[Shown]) -> list[dict[str, Any]]:
+    """What drives can show, one record per look; sizes in m for the mean, factors for the spread."""
+    return [asdict(one) for one in shown]
 
 
 def column_record(column: str, result: LoopResult) -> dict[str, Any]:

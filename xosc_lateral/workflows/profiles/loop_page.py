@@ -12,7 +12,7 @@ from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.profiles import loop_figures, loop_words
+from xosc_lateral.workflows.profiles import loop_figures, loop_shown, loop_words
 from xosc_lateral.workflows.profiles.loop_json import column_record
 from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
 
@@ -29,6 +29,8 @@ def loop_text(result: LoopResult) -> str:
     lines += [
         f"{loop_words.taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back
     ]
+    own = [one for one in result.identified.selection.rejected if one.own_way]
+    lines += [f"{loop_words.taken_back_words(one)}: {one.why}" for one in own]
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
@@ -71,6 +73,8 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
+    page.section("What these drives can show", loop_shown.SHOWN_NOTE)
+    page.table(loop_shown.shown_rows(result.shown))
     page.section("Consequences of the car's own movement")
     feedback = result.identified.usable.feedback
     if feedback:

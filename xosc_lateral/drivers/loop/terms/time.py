@@ -21,7 +21,14 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop import low_frequencies as low
 from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
-from xosc_lateral.drivers.loop.drives import MEAN_INFLATION, SPREAD_INFLATION, Pooled, own_time, slope_alike
+from xosc_lateral.drivers.loop.drives import (
+    MEAN_INFLATION,
+    SPREAD_INFLATION,
+    Pooled,
+    counted,
+    own_time,
+    slope_alike,
+)
 from xosc_lateral.drivers.loop.model import CLIP, Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
@@ -81,7 +88,9 @@ class StepTerm(_MeanByTime):
             return None
         alike = mean_alike(fitted)
         if not coarse.lasts:  # short drives say which way they go, one by one, and nothing of the form
-            return None if alike is None else Outcome(TimeMeanTerm(), (), alike.p_value)
+            if alike is None:
+                return None
+            return _unless_unlike(cls, search, fitted, alike, Outcome(TimeMeanTerm(), (), alike.p_value))
         rows, whitener = low.slow_rows(fitted)
         moments = low.step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
@@ -301,13 +310,26 @@ def spread_alike(fitted: Fitted) -> Pooled | None:
     pooled = slope_alike(rows, column, coarse, SPREAD_INFLATION)
     clipped = np.minimum(squares.values, CLIP)[squares.valid]
     unit = 0.5 * float(clipped.std() / max(float(clipped.mean()), 1e-300))  # of a square to that of a logarithm
-    return pooled and replace(pooled, size=unit * pooled.size, error=unit * pooled.error)
+    if pooled is None:
+        return None
+    # each drive's own slowest half cosine beside those that are a little quicker
+    waves = np.cos(np.pi * own_time(coarse) / np.maximum(counted(coarse), 1.0)[coarse.drive])
+    each = waves[:, None] * (coarse.drive[:, None] == np.flatnonzero(counted(coarse)))
+    slow, basis = (
+        low.low_frequencies(one, coarse, squares.valid, low.SHORTEST_S, MIN_VALID_S)
+        for one in (squares.standardised[:, None], each)
+    )
+    within = low.smooth_probabilities(slow[:, 0], basis, (basis.shape[1],)).get(basis.shape[1], 1.0)
+    return replace(pooled, size=unit * pooled.size, error=unit * pooled.error, within=within)
 
 
 def _unless_unlike(kind: type[Term], search: Search, fitted: Fitted, alike: Pooled | None, outcome: Outcome) -> Outcome:
     """Something changes within drives; unless it does so in all of them alike, a profile can't say when."""
-    unlike = alike is not None and alike.p_value > ALIKE and kind.passes(search, outcome.p_value, fitted)
-    return replace(outcome, term=None, own_way=alike.p_value) if unlike and alike is not None else outcome
+    passes = kind.passes(search, outcome.p_value, fitted)
+    if alike is None or (passes and alike.p_value <= ALIKE):
+        return outcome
+    own_way = min(alike.within, outcome.p_value if passes else 1.0)
+    return replace(outcome, term=None, own_way=own_way if kind.passes(search, own_way, fitted) else None)
 
 
 def _named(form: str, others: tuple[str, ...], when: str) -> tuple[str, str]:
