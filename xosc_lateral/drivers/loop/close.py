@@ -1,14 +1,21 @@
-"""Close the loop: find, prove, add, refit, and score on blocks that nothing was chosen or fitted on."""
+"""Close the loop: find, prove, add, refit, and score on blocks that nothing was chosen or fitted on.
+
+References
+----------
+.. [1] O. Miettinen, "Estimability and estimation in case-referent studies", American J. Epidemiology 103, 1976:
+       intervals that agree with their test.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop import held_out
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
@@ -61,12 +68,25 @@ def describe_finding(
     """Put sizes and errors to what was accepted."""
     term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
     about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
-    return _finding(term.describe(fitted, effects, key), scored, **about, **evidence)
+    described = test_based(term.describe(fitted, effects, key), term.kind, accepted.p_value)
+    return _finding(described, scored, **about, **evidence)
+
+
+def test_based(described: Description, kind: str, p_value: float) -> Description:
+    """Where a p-value below 0.001 stands beside an interval across no effect, the error that the test says [1]_."""
+    from scipy.stats import norm
+
+    away = abs(described.size_m - (1.0 if kind in ("scale", "regime") else 0.0))
+    if p_value >= CLEAR_P or NORMAL_95 * described.size_error < away:
+        return described
+    return replace(described, size_error=away / float(norm.isf(0.5 * p_value)))
 
 
 # The held-out error of a profile with more effects may be so many times the base's, 24 runs leave 2 % of noise; or more
 # where other drives of the driver might show less. [-]
 NO_WORSE = 1.05
+CLEAR_P = 1e-3  # Beside such a p-value no interval is across no effect. [-]
+SCORE_SEED = 0  # Runs and half samples that the verdict rests on: the same whatever the seed of the search.
 # Why an effect that does not help is taken back.
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
 
@@ -104,6 +124,15 @@ class LoopResult:
     def error_after(self) -> float:
         """Of the refined profile. [m]"""
         return self.scored.errors[1]
+
+    @property
+    def own_errors(self) -> tuple[float, float] | None:
+        """Before and after, in the cells of the effects that were found: root mean square over them. [m]"""
+        pairs = np.array([(one.error_before, one.error_after) for one in self.findings if one.error_before > 0.0])
+        if not len(pairs):
+            return None
+        before, after = np.sqrt(np.mean(np.square(pairs), axis=0)).tolist()
+        return before, after
 
     @property
     def floor(self) -> float:
@@ -146,9 +175,9 @@ def close_loop(
         final = identified.selection.final
         tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
         lacks = [lack for lack in tested if lack is not None and lack.is_found]
-    setting = Setting(
-        coarse, base if is_given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
-    )
+    verdict = np.random.SeedSequence(SCORE_SEED)
+    refined_kind = ModelKind.AUTOREGRESSIVE if lacks else kind
+    setting = Setting(coarse, base if is_given and not in_sample else None, kind, refined_kind, verdict)
     identified, scored = _that_helps(setting, identified, progress)
     selection = identified.selection
     progress(0.95, "refitting on everything")
@@ -171,7 +200,7 @@ def close_loop(
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         explained=_explained(setting, identified),
-        remainder=check_remainder(selection.final, identified.quantities, root),
+        remainder=check_remainder(selection.final, identified.quantities, verdict),
         shown=tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
         scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,

@@ -74,6 +74,7 @@ class Description:
     measure: str = ""  # What the errors before and after compare; empty: that group.
     lag_s: float | None = None
     response_s: float | None = None
+    static_gain: float | None = None  # What it would be if what drives it stayed: [m]; factor for scale.
     passage: Passage | None = None  # The path through a typical bend, say.
 
 

@@ -115,13 +115,18 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
             yield _entry(fitted, name, acts, "not found", smallest, bound)
 
 
+def between_drives_of(column: str) -> str:
+    """What the look at a column that is constant in every drive is called."""
+    return f"{column} (between drives)"
+
+
 def _of_whole_drives(search: Search, fitted: Fitted) -> Iterator[Shown]:
     """Columns that are constant in every drive."""
     columns = whole_drive_columns(search)
     number = max(1, sum(map(can_be_told, columns.values())))
     for name, values in columns.items():
         for kind in (BetweenTerm, BetweenSpreadTerm):
-            what = f"{name} (between drives)"
+            what = between_drives_of(name)
             if not can_be_told(values):
                 there = int(np.isfinite(values).sum())
                 why = f"cannot be told from the own differences of {there} drives"

@@ -157,9 +157,14 @@ def meaning(finding: Finding, result: LoopResult) -> str:
         when = f"The driver responds {start}{slow}."
     elif finding.columns and not finding.over_time:
         when = "What counts is the mean of each drive, not changes within a drive."
+    static = ""
+    if finding.static_gain is not None and abs(finding.static_gain - finding.size_m) > 0.05 * abs(finding.size_m):
+        stays = KINDS[finding.kind][0].format(finding.static_gain, "")
+        static = f"This is what the path shows; if what drives it stayed, it would be {stays}."
     words = [
         sentence,
         when,
+        static,
         f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:

@@ -263,7 +263,7 @@ class CourseTerm(MeanTerm):
         described = super().describe(fitted, effects, key)
         size, error = passage.largest_shift
         over_time = replace(described, shape=f"{described.shape}, over time", lag_s=None, response_s=None)
-        return replace(over_time, size_m=size, size_error=error, passage=passage)
+        return replace(over_time, size_m=size, size_error=error, static_gain=None, passage=passage)
 
     def _weights(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
         """Gain at each delay and its covariance, smooth as far as the rows leave it open. [m] per unit"""
