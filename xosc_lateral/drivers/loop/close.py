@@ -68,11 +68,11 @@ def describe_finding(
     """Put sizes and errors to what was accepted."""
     term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
     about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
-    described = test_based(term.describe(fitted, effects, key), term.kind, accepted.p_value)
+    described = agreeing(term.describe(fitted, effects, key), term.kind, accepted.p_value)
     return _finding(described, scored, **about, **evidence)
 
 
-def test_based(described: Description, kind: str, p_value: float) -> Description:
+def agreeing(described: Description, kind: str, p_value: float) -> Description:
     """Where a p-value below 0.001 stands beside an interval across no effect, the error that the test says [1]_."""
     from scipy.stats import norm
 
