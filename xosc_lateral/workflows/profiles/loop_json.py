@@ -33,8 +33,7 @@ FINDING_FIELDS = (
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     own = result.own_errors
-    cells = {"own_before": own and own[0], "own_after": own and own[1]}
-    error = cells | {"before": result.error_before, "after": result.error_after, "floor": result.floor}
+    error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     left, scores, known = result.lack_of_fit, result.scores, result.explained
     return {
         "drives": list(result.coarse.timeline.names),
@@ -56,6 +55,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         ],
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "shown": shown_records(result.shown),
+        "own_error": own and {"before": own[0], "after": own[1]},
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
         "explained": known
