@@ -21,6 +21,7 @@ _HOME = {
     "sample": "workflows.profiles.sample",
     "evaluate": "workflows.profiles.evaluate",
     "close_loop": "workflows.profiles.loop",
+    "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
@@ -52,6 +53,7 @@ _HOME = {
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
+    "LoopPlan": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
     "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
@@ -75,6 +77,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "sample",
     "evaluate",
     "close_loop",
+    "plan_loop",
     "detect",
     "read_drives",
     "import_drives",
@@ -106,6 +109,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Offsets",
     "Evaluation",
     "ClosedLoop",
+    "LoopPlan",
     "Detection",
     "ImportedDrives",
     "XoscLateralError",
@@ -146,7 +150,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
-    from xosc_lateral.workflows.profiles.loop import ClosedLoop, close_loop
+    from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
     from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_drives

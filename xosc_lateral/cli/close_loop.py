@@ -57,11 +57,14 @@ def shown_progress(title: str, quiet: bool) -> Iterator[Callable[[float, str], N
     app, "close-loop", VERBS["close-loop"],
     "close-loop drives.csv.gz -o refined.json --report loop/",
     "close-loop drives.csv.gz -p motorway -o refined.json --report loop/",
+    "close-loop drives.csv.gz --plan",
 )
 def close_loop(
     tables: Tables, *,
-    output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")],
-    report: Annotated[Path, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")],
+    output: Annotated[str, typer.Option("--output", "-o", metavar="REFINED.json", help="Profile to write.")] = "",
+    report: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for report.json and report.html.")] = None,
+    plan: Annotated[bool, typer.Option("--plan",
+        help="Say what these drives can show, and seek no effect; nothing is written.")] = False,
     options: Annotated[Options, xl.close_loop],
     reply: Written,
 ) -> None:
@@ -71,6 +74,12 @@ def close_loop(
     from xosc_lateral.workflows.profiles.loop import ClosedLoop
     from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
 
+    if plan:
+        asked = {name: options[name] for name in ("seed", "leave_out", "roles", "columns") if name in options}
+        reply.say(xl.plan_loop(tables, **asked))
+        return
+    if not output or report is None:
+        raise typer.BadParameter("both are needed, or --plan", param_hint="'--output' and '--report'")
     written = output_file(output, "refined.json", PROFILE_SUFFIXES)
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=reply.force)
     with shown_progress("closing the loop", reply.quiet) as progress:

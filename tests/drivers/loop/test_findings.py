@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.loop.close import _finding, describe_finding
+from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.drivers.loop.close import _finding, agreeing, describe_finding
 from xosc_lateral.drivers.loop.core_model import TIMES_S, DriverVariance, SpectrumShape
 from xosc_lateral.drivers.loop.held_out import HeldOut
+from xosc_lateral.drivers.loop.model import Description
 from xosc_lateral.drivers.loop.selection import Accepted
 from xosc_lateral.drivers.loop.terms.time import StepTerm
 from xosc_lateral.drivers.model.effects import Step
@@ -51,3 +53,13 @@ def test_drivers_that_differ_are_told_with_the_error_of_their_spread() -> None:
     assert found.size_error == pytest.approx(0.15 / np.sqrt(100.0))
     assert found.shape == "50 drives; their spreads scatter by a factor of 1.22"
     assert (found.kind, found.error_before) == ("population", 0.0)
+
+
+@pytest.mark.parametrize(("kind", "size", "none"), [("location", 0.2, 0.0), ("scale", 1.4, 1.0), ("scale", 0.7, 1.0)])
+def test_no_interval_is_across_no_effect_beside_a_certain_p_value(kind: str, size: float, none: float) -> None:
+    wide = Description("x", "linear", size, 0.5, "")
+    about = NORMAL_95 * agreeing(wide, kind, 1e-4).size_error
+    assert 0.0 < about < abs(size - none)
+    assert agreeing(wide, kind, 0.01) == wide
+    narrow = Description("x", "linear", size, 0.01, "")
+    assert agreeing(narrow, kind, 1e-4) == narrow

@@ -81,3 +81,18 @@ def test_weather_that_only_rises_is_weather() -> None:
 def test_a_minute_tells_no_clock() -> None:
     short = timeline_of(movement(np.random.default_rng(4), 100.0), {"x": np.arange(500.0)})
     assert not is_clock(short, "x")
+
+
+def test_counters_of_short_drives_are_clocks_and_what_turns_is_not() -> None:
+    """Three drives of five minutes, whose counters begin anew."""
+    rng, n = np.random.default_rng(5), round(330.0 / 0.2)
+    time = 0.2 * np.arange(n)
+    rising = np.floor(time * 3.0)
+    columns = {
+        "trip": np.tile(rising, 3),
+        "charge": np.tile(80.0 - 0.01 * time, 3),
+        "turns": np.concatenate([rising, rising, rising[::-1]]),
+        "walk": np.cumsum(rng.normal(size=3 * n)) / np.sqrt(n),
+    }
+    short = timeline_of(np.zeros(3 * n), columns, drives=3)
+    assert {name for name in columns if is_clock(short, name)} == {"trip", "charge"}

@@ -26,7 +26,7 @@ def test_the_order_of_the_stages() -> None:
         ["time_spread", "spread", "slow_spread"],
         ["regimes"],
         ["fine_noise"],
-        ["between"],
+        ["between", "between_spread"],
     ]
 
 

@@ -1,24 +1,32 @@
-"""Close the loop: find, prove, add, refit, and score on blocks that nothing was chosen or fitted on."""
+"""Close the loop: find, prove, add, refit, and score on blocks that nothing was chosen or fitted on.
+
+References
+----------
+.. [1] O. Miettinen, "Estimability and estimation in case-referent studies", American J. Epidemiology 103, 1976:
+       intervals that agree with their test.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.loop import held_out
 from xosc_lateral.drivers.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
 from xosc_lateral.drivers.loop.held_out import HeldOut, Scorecard, Setting
-from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms
+from xosc_lateral.drivers.loop.identify import Identified, Progress, folds_of, identify, initial_terms, search_of
 from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
+from xosc_lateral.drivers.loop.shown import Shown, what_drives_show
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.between import between_shift
 from xosc_lateral.drivers.loop.timeline import Coarse, coarse_middle, join_drives
@@ -60,12 +68,25 @@ def describe_finding(
     """Put sizes and errors to what was accepted."""
     term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
     about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
-    return _finding(term.describe(fitted, effects, key), scored, **about, **evidence)
+    described = agreeing(term.describe(fitted, effects, key), term.kind, accepted.p_value)
+    return _finding(described, scored, **about, **evidence)
+
+
+def agreeing(described: Description, kind: str, p_value: float) -> Description:
+    """Where a p-value below 0.001 stands beside an interval across no effect, the error that the test says [1]_."""
+    from scipy.stats import norm
+
+    away = abs(described.size_m - (1.0 if kind in ("scale", "regime") else 0.0))
+    if p_value >= CLEAR_P or NORMAL_95 * described.size_error < away:
+        return described
+    return replace(described, size_error=away / float(norm.isf(0.5 * p_value)))
 
 
 # The held-out error of a profile with more effects may be so many times the base's, 24 runs leave 2 % of noise; or more
 # where other drives of the driver might show less. [-]
 NO_WORSE = 1.05
+CLEAR_P = 1e-3  # Beside such a p-value no interval is across no effect. [-]
+SCORE_SEED = 0  # Runs and half samples that the verdict rests on: the same whatever the seed of the search.
 # Why an effect that does not help is taken back.
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
 
@@ -86,6 +107,7 @@ class LoopResult:
     remainder: Omnibus  # Whether any column predicts it.
     explained: Explained | None  # Of what columns can explain, on held-out blocks; None: nothing can be held out.
     scores: Scorecard  # The ten metrics.
+    shown: tuple[Shown, ...]  # What these drives can show.
     seed: int
 
     @property
@@ -102,6 +124,15 @@ class LoopResult:
     def error_after(self) -> float:
         """Of the refined profile. [m]"""
         return self.scored.errors[1]
+
+    @property
+    def own_errors(self) -> tuple[float, float] | None:
+        """Before and after, in the cells of the effects that were found: root mean square over them. [m]"""
+        pairs = np.array([(one.error_before, one.error_after) for one in self.findings if one.error_before > 0.0])
+        if not len(pairs):
+            return None
+        before, after = np.sqrt(np.mean(np.square(pairs), axis=0)).tolist()
+        return before, after
 
     @property
     def floor(self) -> float:
@@ -144,9 +175,9 @@ def close_loop(
         final = identified.selection.final
         tested = compare_spectrum_shapes(base, timeline, root), test_population(final, between_shift(final))
         lacks = [lack for lack in tested if lack is not None and lack.is_found]
-    setting = Setting(
-        coarse, base if is_given and not in_sample else None, kind, ModelKind.AUTOREGRESSIVE if lacks else kind, root
-    )
+    verdict = np.random.SeedSequence(SCORE_SEED)
+    refined_kind = ModelKind.AUTOREGRESSIVE if lacks else kind
+    setting = Setting(coarse, base if is_given and not in_sample else None, kind, refined_kind, verdict)
     identified, scored = _that_helps(setting, identified, progress)
     selection = identified.selection
     progress(0.95, "refitting on everything")
@@ -169,10 +200,24 @@ def close_loop(
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         explained=_explained(setting, identified),
-        remainder=check_remainder(selection.final, identified.quantities, root),
+        remainder=check_remainder(selection.final, identified.quantities, verdict),
+        shown=tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
         scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
         seed=seed,
     )
+
+
+def plan_loop(
+    drives: Sequence[Drive],
+    *,
+    seed: int,
+    excluded: Sequence[str] = (),
+    roles: Mapping[str, str] = MappingProxyType({}),
+) -> list[Shown]:
+    """What drives can show before any effect is sought: sizes that would be found with 80 % probability."""
+    coarse = Coarse.of(join_drives(drives))
+    usable, search = search_of(coarse, np.random.SeedSequence(seed), excluded, roles)
+    return what_drives_show(search, fit_model(coarse, ()), usable.not_tested, plan=True)
 
 
 def _that_helps(setting: Setting, identified: Identified, progress: Progress) -> tuple[Identified, HeldOut]:

@@ -26,7 +26,7 @@ from xosc_lateral.drivers.loop.dictionary import (
 from xosc_lateral.drivers.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.drivers.loop.omnibus import courses
 from xosc_lateral.drivers.loop.refinement import Refined, Refinement
-from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, draw_null, upper_tail
+from xosc_lateral.drivers.loop.significance import NULL_DRAWS, LoopSeed, draw_null, score_at, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
@@ -143,6 +143,11 @@ class ColumnSearch:
             return 1.0
         members = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
         return upper_tail(float(scored.scores[members].max()), scored.maxima) if members else 1.0
+
+    def limits(self, level: float) -> tuple[Problem, FloatArray, float] | None:
+        """Regression, what is known in it (white, orthonormal), and the score whose p-value is a level; None: empty."""
+        scored = self._scored_once()
+        return None if scored is None else (scored.problem, scored.known, score_at(level, scored.maxima))
 
     def likely_response(self, level: float) -> tuple[FloatArray, float]:
         """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""

@@ -37,11 +37,11 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.loop.autocorrelation import positions_in_run
-from xosc_lateral.drivers.loop.timeline import Timeline
+from xosc_lateral.drivers.loop.timeline import PAD, Timeline
 
-# A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
-# to end. A random walk's is below a half. [-]
-CLOCK_MINUTES, CLOCK_SHARE = 10, 0.95
+# A clock goes on in at least half of so many half minutes, over all drives, and hardly ever back: share of its way that
+# is the way from end to end. Counters of 150 sets of short drives have it in 99 %, speed, grade and weather in none.
+CLOCK_STEP_S, CLOCK_STEPS, CLOCK_SHARE = 30.0, 14, 0.95
 MAX_LEVELS = 8  # More different whole numbers than this are a number, not levels. [-]
 # A level or presence on for less than this share of the road-following time (12 s of 50 min) tells nothing. [-]
 MIN_SHARE = 0.004
@@ -127,23 +127,23 @@ def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, st
 
 
 def is_clock(timeline: Timeline, column: str) -> bool:
-    """Whether a column goes one way through drives of ten minutes: a counter, an odometer, a state of charge."""
-    values = timeline.context.get(column, timeline.lane_width)
-    rows = round(60.0 / timeline.step)
-    long = [span for span in timeline.spans if span.stop - span.start >= (CLOCK_MINUTES + 1) * rows]
-    return bool(long) and all(_goes_one_way(values[span], rows) for span in long)
+    """Whether a column goes one way through every drive, the same way: a counter, an odometer, a state of charge."""
+    values, rows = timeline.context.get(column, timeline.lane_width), round(CLOCK_STEP_S / timeline.step)
+    inside = [values[span.start + PAD : span.stop - PAD] for span in timeline.spans]
+    ways = [_way(one, rows) for one in inside if len(one) >= 2 * rows]  # of a shorter drive there is no step
+    return sum(abs(one) for one in ways) >= CLOCK_STEPS and len(set(np.sign(ways))) == 1
 
 
-def _goes_one_way(values: FloatArray, rows: int) -> bool:
-    minutes = len(values) // rows
+def _way(values: FloatArray, rows: int) -> int:
+    """Number of steps of a drive that goes one way, negative where it falls; 0: it does not, or is too short."""
+    parts = len(values) // rows
     with np.errstate(invalid="ignore"):
-        means = values[: minutes * rows].reshape(minutes, rows).mean(axis=1)
-    if not np.isfinite(means).all():
-        return False
-    change = np.diff(means)
-    way = float(np.abs(change).sum())
-    moving = np.mean(np.abs(change) > 1e-9 * max(way, 1e-300))
-    return way > 0.0 and float(moving) >= 0.5 and abs(float(means[-1] - means[0])) >= CLOCK_SHARE * way
+        change = np.diff(values[: parts * rows].reshape(parts, rows).mean(axis=1))
+    if not np.isfinite(change).all():
+        return 0
+    way, end = float(np.abs(change).sum()), float(change.sum())
+    moving = float(np.mean(np.abs(change) > 1e-9 * max(way, 1e-300)))
+    return len(change) * int(np.sign(end)) if moving >= 0.5 and abs(end) >= CLOCK_SHARE * way else 0
 
 
 class Values(Enum):

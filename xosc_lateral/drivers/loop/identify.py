@@ -48,6 +48,11 @@ class Usable:
     unused: Mapping[str, str]
     roles: Mapping[str, Assigned]
 
+    @property
+    def not_tested(self) -> dict[str, str]:
+        """Columns that are not tested as causes, and why."""
+        return {**self.unused, **dict.fromkeys((one.column for one in self.feedback), "a consequence of the movement")}
+
 
 @dataclass(frozen=True, eq=False)
 class Identified:
@@ -55,10 +60,15 @@ class Identified:
 
     usable: Usable
     selection: Selection  # Terms that are kept, each with its held-out gain, and everything rejected.
-    quantities: Quantities  # What was searched.
+    search: Search  # Where it was searched for.
     nested: Nested | None = None  # Selections of all folds; None: nothing was found.
     total: Gain | None = None  # Of all kept terms together.
     returned_base: str = ""  # Why nothing is kept although something was found; empty otherwise.
+
+    @property
+    def quantities(self) -> Quantities:
+        """What was searched."""
+        return self.search.quantities
 
     @property
     def taken_back(self) -> tuple[Rejected, ...]:
@@ -87,27 +97,38 @@ def identify(
     """Select terms beside the `initial` ones; keep what predicts blocks that it was not selected and sized on."""
     from threadpoolctl import threadpool_limits
 
-    usable = usable_columns(coarse.timeline, excluded, roles)
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
-        search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
+        usable, search = search_of(coarse, seed, excluded, roles, lambda what: progress(0.1, what))
         selection = name_time_beside(search, select(search, initial))
         if not selection.accepted:
-            return Identified(usable, selection, search.quantities)
+            return Identified(usable, selection, search)
         accepted = [one.term for one in selection.accepted]
 
         def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
         nested = nest(search, initial, accepted, finished)
-        return _worst_first(Identified(usable, selection, search.quantities, nested))
+        return _worst_first(Identified(usable, selection, search, nested))
+
+
+def search_of(
+    coarse: Coarse,
+    seed: np.random.SeedSequence,
+    excluded: Sequence[str],
+    roles: Mapping[str, str],
+    progress: Callable[[str], None] = lambda _: None,
+) -> tuple[Usable, Search]:
+    """Columns of drives, and where effects of those that may act are searched for."""
+    usable = usable_columns(coarse.timeline, excluded, roles)
+    return usable, Search.over(coarse, usable.columns, seed, ERROR_BUDGET, progress)
 
 
 def name_time_beside(search: Search, selection: Selection) -> Selection:
     """Columns that changed as a change with time would, which explains about as much: either may be why."""
     for finding in selection.accepted:
         before = finding.term
-        if not isinstance(before, MeanTerm | SpreadTerm) or not search.coarse.lasts:
+        if not isinstance(before, MeanTerm | SpreadTerm):
             continue
         without = selection.without([before], "").final
         test = (StepTerm if isinstance(before, MeanTerm) else TimeSpreadTerm).test(search, without)

@@ -56,14 +56,16 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
     return whitener.rows(left), whitener
 
 
-def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float) -> FloatArray:
-    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k)."""
+def low_frequencies(
+    values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float, least_s: float = MIN_DRIFT_S
+) -> FloatArray:
+    """Cosine transform of each drive of `least_s`, without its mean and what is quicker, shape (frequencies, k)."""
     from scipy.fft import dct
 
     coefficients = []
     for index in range(coarse.drives):
         series = values[valid & (coarse.drive == index)]
-        if len(series) >= MIN_DRIFT_S:
+        if len(series) >= least_s:
             number = max(round(2.0 * len(series) / shortest_s), max(ORDERS) + LEAST_OTHERS)
             coefficients.append(dct(series, type=2, norm="ortho", axis=0)[1 : number + 1])
     return np.concatenate(coefficients) if coefficients else np.zeros((0, values.shape[1]))

@@ -74,6 +74,7 @@ class Description:
     measure: str = ""  # What the errors before and after compare; empty: that group.
     lag_s: float | None = None
     response_s: float | None = None
+    static_gain: float | None = None  # What it would be if what drives it stayed: [m]; factor for scale.
     passage: Passage | None = None  # The path through a typical bend, say.
 
 
@@ -87,6 +88,7 @@ class Outcome:
     after: Fitted | None = None  # Fit with the term, where the test has made it.
     together: tuple[Term, ...] = ()  # Found with it, as one finding.
     instead_of: Term | None = None  # Whose place it takes.
+    own_way: float | None = None  # p-value of a change within drives, where each changes in its own way.
 
 
 class Term(ABC):

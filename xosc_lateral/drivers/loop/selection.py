@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from logging import getLogger
 
 import numpy as np
 
@@ -40,6 +41,8 @@ def shared_among(kinds: tuple[type[Term], ...]) -> dict[str, float]:
 
 STAGES = in_stages(TERMS)  # Of a stage, what has the smallest p-value is added first.
 ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
+# What a mistake in a test or a description raises; errors that are meant for the user are others.
+UNFORESEEN = (ArithmeticError, AssertionError, LookupError, TypeError, ValueError)
 MAX_TERMS = 8  # Terms of one table, at most.
 UNDONE_LEVEL = 0.01  # Probability with which an effect between drives that is as within them is taken back.
 # Why a term of the movement's size is taken back that holds within drives alone.
@@ -81,13 +84,14 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Rejected:
-    """A candidate that did not pass; `was_found`: it was significant, and taken back."""
+    """A candidate that did not pass; `was_found`: it was significant, and taken back; `own_way`: each drive changes."""
 
     component: str
     columns: tuple[str, ...]
     p_value: float
     why: str
     was_found: bool = False
+    own_way: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +130,12 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             for kind in [kind for kind in kinds if seen_at.get(kind.component) != len(accepted)]:
                 component = kind.component
                 search.progress(f"looking at {component.replace('_', ' ')}")
-                test = kind.test(search, fitted)
+                try:
+                    test = kind.test(search, fitted)
+                except UNFORESEEN as error:
+                    seen_at[component] = len(accepted)
+                    rejected[component] = Rejected(component, (), 1.0, failed("its test", error))
+                    continue
                 if test is None:
                     continue
                 if test.term is not None and kind.passes(search, test.p_value, fitted):
@@ -134,7 +143,11 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 else:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
-                    rejected[component] = Rejected(component, test.columns, test.p_value, why)
+                    if (own := test.own_way) is not None:
+                        why = (
+                            f"it changes within drives (p = {own:.1e}), in each in its own way, which no profile knows"
+                        )
+                    rejected[component] = Rejected(component, test.columns, test.p_value, why, own_way=own is not None)
             if not passed:
                 break
             p_value, new, test = min(passed, key=lambda candidate: candidate[0])
@@ -145,9 +158,30 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             fitted = test.after or fit_model(search.coarse, (*fitted.terms, *new))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for candidate in accepted:
-        selection = _tested_again(search, selection, candidate)
+        try:
+            selection = _tested_again(search, selection, candidate)
+        except UNFORESEEN as error:
+            selection = selection.without([candidate.term], failed("its second test", error))
+    selection = _that_can_be_told(selection)
     undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
     return selection.without(undone, UNDONE) if undone else selection
+
+
+def failed(what: str, error: Exception) -> str:
+    """Why a finding is given up where the program is wrong; the log gets where."""
+    getLogger(__name__).error("%s failed", what, exc_info=error)
+    return f"{what} failed, which is a fault of this program ({type(error).__name__}: {error})"
+
+
+def _that_can_be_told(selection: Selection) -> Selection:
+    """Less what can't be sized or described: one faulty effect must not cost the others."""
+    for one in selection.accepted:
+        alone = fit_model(selection.final.coarse, [*selection.start.terms, one.term])
+        try:
+            one.term.describe(alone, one.term.estimate(alone), "")
+        except UNFORESEEN as error:
+            selection = selection.without([one.term], failed("its description", error))
+    return selection
 
 
 def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:

@@ -21,6 +21,7 @@ class LoopSeed(IntEnum):
     SPECTRUM = 7  # Runs whose spectrum is compared with the drives'.
     BLOCKS = 9  # Half samples of the blocks.
     SNIPPETS = 11  # Halves of the blocks whose snippets are compared.
+    CYCLE = 12  # White rows that the highest line of the spectrum is compared with.
     OMNIBUS = 13  # Rotations that what is left is compared with.
 
 
@@ -62,6 +63,15 @@ def upper_tail(
     excess = max(float(np.mean(null[null > knee] - knee)) if np.any(null > knee) else 0.0, least_excess, 1e-300)
     p_value = tail_share * float(np.exp(-draws * np.log1p((score - knee) / (excess * draws))))
     return max(min(p_value, COUNTED_DRAWS / independent), MINIMUM_P)
+
+
+def score_at(level: float, null: FloatArray) -> float:
+    """Score whose `upper_tail` is a level, by bisection; infinite without a null."""
+    low, high = (float(null.min()), float(null.max()) + 1e3) if len(null) else (np.inf, np.inf)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if upper_tail(middle, null) > level else (low, middle)
+    return high
 
 
 def effective_number(draws: FloatArray) -> float:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_folder
@@ -23,6 +23,7 @@ from xosc_lateral.workflows.result import (
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.loop.close import LoopResult
+    from xosc_lateral.drivers.loop.shown import Shown
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
@@ -97,6 +98,71 @@ def close_loop(
     return ClosedLoop(result, inputs)
 
 
+def plan_loop(
+    drives: DrivesLike,
+    *,
+    seed: int = 0,
+    leave_out: Collection[str] = (),
+    roles: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
+) -> LoopPlan:
+    """What drives can show, before any effect is sought: the smallest effects that `close_loop` would find.
+
+    Parameters
+    ----------
+    drives, columns
+        See `read_drives`.
+    leave_out, roles
+        See `close_loop`.
+
+    Raises
+    ------
+    NotEnoughDataError
+        Too little road-following is left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
+    """
+    from xosc_lateral.drivers.loop import close
+    from xosc_lateral.files.mapping import as_mapping
+
+    inputs = given_drives(drives, columns)
+    there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
+    of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
+    with naming(inputs):
+        shown = close.plan_loop(inputs.drives, seed=seed, excluded=list(leave_out), roles={**of_file, **(roles or {})})
+    return LoopPlan(shown)
+
+
+class LoopPlan(Result):
+    """What drives can show: for every column, time, step, cycle, regimes and drives, the smallest effect."""
+
+    __slots__ = ("_shown",)
+
+    def __init__(self, shown: Sequence[Shown]) -> None:
+        self._shown = tuple(shown)
+
+    def headline(self) -> str:
+        """One line."""
+        from xosc_lateral.workflows.profiles.loop_shown import shown_words
+
+        return shown_words(self._shown)
+
+    def __str__(self) -> str:
+        from xosc_lateral.workflows.profiles.loop_shown import shown_text
+
+        return shown_text(self._shown)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per look: `what`, `acts`, `tested`, `why`, `smallest`, `bound`, `more_minutes`."""
+        return pd.DataFrame(self.to_dict()["shown"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.workflows.profiles.loop_json import finite, shown_records
+
+        return {"shown": finite(shown_records(self._shown))}
+
+
 class ClosedLoop(Result):
     """What was missing, how sure and how big; the refined profile; the error before and after."""
 
@@ -150,6 +216,8 @@ class ClosedLoop(Result):
         """One line."""
         names = ", ".join(self.findings) or "no effect added"
         error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
+        if (own := self._result.own_errors) is not None:
+            error = f"where they act, error {own[0]:.4f} -> {own[1]:.4f} m; over everything {error}"
         return f"{names}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:
@@ -157,8 +225,13 @@ class ClosedLoop(Result):
 
         return loop_text(self._result)
 
-    def to_frame(self) -> pd.DataFrame:
-        """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
+    def to_frame(self, table: Literal["findings", "shown"] = "findings") -> pd.DataFrame:
+        """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ...
+
+        Or what these drives can show (`table="shown"`), one row per look, as `plan_loop` has it, with bounds.
+        """
+        if table == "shown":
+            return pd.DataFrame(self.to_dict()["shown"])
         names = ["effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "p_value"]
         return pd.DataFrame(self.to_dict()["findings"], columns=[*names, "error_before", "error_after"])
 

@@ -13,6 +13,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.loop.close import Finding, LoopResult
 from xosc_lateral.drivers.loop.identify import held_out_words
 from xosc_lateral.drivers.loop.selection import Gain
+from xosc_lateral.drivers.loop.shown import Shown, between_drives_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
@@ -24,13 +25,14 @@ MEASURE = (
 )
 
 FINDING_FIELDS = (
-    *("effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "size_error"),
+    *("effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "size_error", "static_gain"),
     *("p_value", "error_before", "error_after"),
 )
 
 
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
+    own = result.own_errors
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     left, scores, known = result.lack_of_fit, result.scores, result.explained
     return {
@@ -52,6 +54,8 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
             for item in result.identified.selection.rejected
         ],
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
+        "shown": shown_records(result.shown),
+        "own_error": own and {"before": own[0], "after": own[1]},
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
         "explained": known
@@ -82,12 +86,18 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     }
 
 
+def shown_records(shown: Sequence[Shown]) -> list[dict[str, Any]]:
+    """What drives can show, one record per look; sizes in m for the mean, factors for the spread."""
+    return [asdict(one) for one in shown]
+
+
 def column_record(column: str, result: LoopResult) -> dict[str, Any]:
     """What a column was taken for, by whom, and what was done with it."""
     usable = result.identified.usable
     assigned = usable.roles[column]
     follows = any(item.column == column for item in usable.feedback)
-    used = "consequence" if follows else usable.unused.get(column, "tested as a cause")
+    too_few = (one.why for one in result.shown if one.what == between_drives_of(column) and not one.tested)
+    used = "consequence" if follows else usable.unused.get(column) or next(too_few, "tested as a cause")
     return {"column": column, "role": assigned.role.value, "by": assigned.source or None, "use": used}
 
 

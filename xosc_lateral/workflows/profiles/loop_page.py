@@ -12,7 +12,7 @@ from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.profiles import loop_figures, loop_words
+from xosc_lateral.workflows.profiles import loop_figures, loop_shown, loop_words
 from xosc_lateral.workflows.profiles.loop_json import column_record
 from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
 
@@ -29,13 +29,17 @@ def loop_text(result: LoopResult) -> str:
     lines += [
         f"{loop_words.taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back
     ]
+    unlike = [one for one in result.identified.selection.rejected if one.own_way]
+    lines += [f"{loop_words.taken_back_words(one)}: {one.why}" for one in unlike]
     for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
     before, after, halves = (1000.0 * value for value in (result.error_before, result.error_after, result.floor))
-    lines.append(
-        f"held-out error {before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
-    )
+    if (own := result.own_errors) is not None:
+        lines.append(f"where the effects act: held-out error {1e3 * own[0]:.1f} mm before, {1e3 * own[1]:.1f} mm after")
+    over = "over everything: " if result.own_errors else ""
+    ends = f"{before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
+    lines.append(f"{over}held-out error {ends}")
     lines += [words for words in (loop_words.explained_words(result), loop_words.lack_of_fit_words(result)) if words]
     return "\n".join(lines)
 
@@ -58,8 +62,18 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(loop_words.outcome(result))
     tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
+    own = result.own_errors
+    figures = (
+        []
+        if own is None
+        else [
+            KeyFigure(f"{1e3 * own[0]:.1f} mm", "before, where the effects act", "in the cells of what was found"),
+            KeyFigure(f"{1e3 * own[1]:.1f} mm", "after, where the effects act", "in the same cells"),
+        ]
+    )
     page.key_figures(
         [
+            *figures,
             KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
             KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
             KeyFigure(
@@ -71,6 +85,8 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
+    page.section("What these drives can show", loop_shown.SHOWN_NOTE)
+    page.table(loop_shown.shown_rows(result.shown))
     page.section("Consequences of the car's own movement")
     feedback = result.identified.usable.feedback
     if feedback:

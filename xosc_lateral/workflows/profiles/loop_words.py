@@ -15,12 +15,12 @@ from xosc_lateral.drivers.loop.selection import Rejected
 from xosc_lateral.drivers.loop.terms.time import CHANGE_WITH_TIME
 from xosc_lateral.drivers.loop.timeline import LOCAL_S
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
+from xosc_lateral.workflows.profiles.loop_shown import GAP, shown_words
 
 CERTAIN_P_VALUE = (
     1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
 )
 NAMED_GROUPS = 4  # So many groups with the most left unexplained are named.
-GAP = "\N{NO-BREAK SPACE}"  # Between a number and its unit: they stay on one line.
 SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
 
 # Signs that a reader of a figure has to know.
@@ -37,6 +37,7 @@ COMPONENT_WORDS: Mapping[str, str] = {
     "mean": "a column that changes the mean offset",
     "course": "a column that changes the mean offset over a course of time",
     "between": "a column that goes with the mean offset of whole drives",
+    "between_spread": "a column that goes with the spread of whole drives",
     "spread": "a column that changes the spread",
     "slow_spread": "a column that changes the spread of slow movement",
     "fine_noise": "a column that changes the fine noise",
@@ -156,9 +157,14 @@ def meaning(finding: Finding, result: LoopResult) -> str:
         when = f"The driver responds {start}{slow}."
     elif finding.columns and not finding.over_time:
         when = "What counts is the mean of each drive, not changes within a drive."
+    static = ""
+    if finding.static_gain is not None and abs(finding.static_gain - finding.size_m) > 0.05 * abs(finding.size_m):
+        stays = KINDS[finding.kind][0].format(finding.static_gain, "")
+        static = f"This is what the path shows; if what drives it stayed, it would be {stays}."
     words = [
         sentence,
         when,
+        static,
         f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:
@@ -263,12 +269,12 @@ def _remainder_words(result: LoopResult) -> str:
             f"{100 * left.share:.1f}{GAP}% of the movement's innovations (p = {left.p_value:.1e})."
         )
     if back:
-        return "What was found and taken back is not explained otherwise."
+        return f"No column predicts what is left (p = {left.p_value:.2f}). {shown_words(result.shown)}"
     if not left.columns:
-        return "What the profile still misses is within chance; there is no column that could explain it."
+        return f"There is no column that could explain what the profile still misses. {shown_words(result.shown)}"
     return (
-        f"No column, at any delay {delays}, predicts what is left (p = {left.p_value:.2f}): what the profile still "
-        "misses is within chance."
+        f"No column, at any delay {delays}, predicts what is left (p = {left.p_value:.2f}): it is within chance. "
+        f"{shown_words(result.shown)}"
     )
 
 

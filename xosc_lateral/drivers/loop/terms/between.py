@@ -2,9 +2,10 @@
 
 Every drive has a level of its own, so what hardly changes within drives can't act on the mean there. Here the levels
 themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
-differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another. Columns of whole
-drives go along with each other (the left lane is the fast one), and two may act against each other and show together
-only: so pairs are tested, too.
+differ anyway. With many drives the null deals them anew, which is exact: drives know nothing of one another. Columns of
+whole drives go along with each other (the left lane is the fast one), and two may act against each other and show
+together only: so pairs are tested, too. Of five drives and more, columns that are constant in each are tested by an
+exact t, on the place as on the size of the movement.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.loop.dictionary import Search, beside
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage
+from xosc_lateral.drivers.loop.drives import FEWEST_BETWEEN, Pooled, counted, regress
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, clipped_squares, design_of
 from xosc_lateral.drivers.loop.significance import MANY_DRIVES, NULL_DRAWS, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
 from xosc_lateral.drivers.loop.timeline import missing_throughout
@@ -55,7 +57,7 @@ class BetweenTerm(ColumnTerm):
         """Best candidate, or pair of candidates, over all columns and shapes, against drives dealt anew."""
         coarse, places = fitted.coarse, _Places.of(fitted)
         if np.count_nonzero(places.weight) < MANY_DRIVES:
-            return None
+            return _best_of_whole_drives(cls, search, fitted)
         present = {name for term in of_kind(fitted, cls) for name in term.columns}
         candidates, usual = [], []
         for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
@@ -98,6 +100,82 @@ class BetweenTerm(ColumnTerm):
         """Change between drives; it has no lag."""
         size = super().describe(fitted, effects, key)
         return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenSpreadTerm(ColumnTerm):
+    """Between-driver regression of the logarithm of the drives' own sizes of movement."""
+
+    component: ClassVar[str] = "between_spread"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
+    weight: ClassVar[float] = 3.0
+    seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.SPREAD
+    what: ClassVar[str] = "spread that a drive has"
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Best column that is constant in every drive, by an exact t of few drives."""
+        return _best_of_whole_drives(cls, search, fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Weighted least squares over drives; the fine noise goes along, as it does with a drive's own size."""
+        usual = fitted.coarse.by_drive(fitted.coarse.response(self.effect)[:, 0])
+        pooled = between_drives(fitted, type(self), usual)
+        sizes, errors = np.array([pooled.size]), np.array([pooled.error])
+        return tuple(self.sized(fitted.coarse, acts, sizes, errors) for acts in (Acts.SPREAD, Acts.FINE))
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor between drives; it has no lag."""
+        size = super().describe(fitted, effects, key)
+        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
+
+
+def whole_drive_columns(search: Search) -> dict[str, FloatArray]:
+    """Columns that may act and are constant in every drive, shape (drives,), in their units; NaN: a drive too short."""
+    coarse, found = search.coarse, {}
+    inside, lasting = coarse.timeline.valid, counted(coarse) > 0.0
+    for name, column in search.columns.items():
+        own = [coarse.context[name][span][inside[span]] for span in coarse.timeline.spans]
+        known = [values for values, lasts in zip(own, lasting, strict=True) if lasts]
+        if column.period or not all(np.isfinite(values).all() and np.ptp(values) == 0.0 for values in known):
+            continue
+        found[name] = np.array([values[0] if lasts else np.nan for values, lasts in zip(own, lasting, strict=True)])
+    return found
+
+
+def can_be_told(values: FloatArray) -> bool:
+    """Whether enough drives differ in a column, shape (drives,), not by a single one of them."""
+    there = np.sort(values[np.isfinite(values)])
+    return len(there) >= FEWEST_BETWEEN and bool(there[0] < there[-2] and there[1] < there[-1])
+
+
+def between_drives(fitted: Fitted, kind: type[ColumnTerm], values: FloatArray) -> Pooled:
+    """Slope of the drives' places or log sizes on a column, shape (drives,). [m] or natural logarithm per unit"""
+    coarse, seconds = fitted.coarse, counted(fitted.coarse)
+    rows = (seconds > 0.0) & np.isfinite(values)
+    if kind is BetweenTerm:
+        own, noise = fitted.levels, 1.0 / np.maximum(fitted.whitener.power, 1e-300)
+    else:
+        _, scales, known = design_of(coarse, fitted.terms)
+        own = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
+        squares = clipped_squares(fitted.innovations, coarse.valid)[coarse.valid]
+        noise = 0.25 * float(squares.var() / squares.mean() ** 2) / np.maximum(seconds, 1.0)
+    return regress(own[rows], noise[rows], values[rows])
+
+
+def _best_of_whole_drives(kind: type[ColumnTerm], search: Search, fitted: Fitted) -> Outcome | None:
+    if of_kind(fitted, kind):
+        return None
+    tested = {name: values for name, values in whole_drive_columns(search).items() if can_be_told(values)}
+    p_values = {name: between_drives(fitted, kind, values).p_value for name, values in tested.items()}
+    if not p_values:
+        return None
+    best = min(p_values, key=p_values.__getitem__)
+    term = kind.of(Linear(acts=kind.acts, column=best, response_s=USUAL_S))
+    return Outcome(term, (best,), min(1.0, p_values[best] * len(p_values)))
 
 
 def is_between(effect: ColumnEffect) -> bool:

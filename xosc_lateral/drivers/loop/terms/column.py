@@ -50,10 +50,11 @@ class ColumnTerm(Term):
         return coarse.strength(effects[0])
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
-        """Change between the 5 % and 95 % quantile of what drives it."""
+        """Change of the expected path between its own 5 % and 95 % quantile; and of what would stay for good."""
         effect = effects[0]
         assert isinstance(effect, ColumnEffect)
-        strength = span(fitted.coarse, effect)
+        static = span(fitted.coarse, effect)
+        strength = on_path(fitted.coarse, effect)
         sizes, errors = np.asarray(effect.coefficients), np.asarray(effect.errors)
         relative = float(np.linalg.norm(errors)) / max(float(np.linalg.norm(sizes)), 1e-12)
         on_mean = effect.acts is Acts.LOCATION
@@ -67,6 +68,7 @@ class ColumnTerm(Term):
             measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect's own quantity",
             lag_s=effect.lag_s,
             response_s=effect.response_s,
+            static_gain=static if on_mean else float(np.exp(static)),
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
@@ -139,6 +141,21 @@ def span(coarse: Coarse, effect: ColumnEffect) -> float:
     """Change of strength between the two ends of the driving range; [m] or natural logarithm."""
     low, high = driving_range(coarse, effect)
     return float((high - low) @ np.asarray(effect.coefficients))
+
+
+def on_path(coarse: Coarse, effect: ColumnEffect) -> float:
+    """Change of what an effect does between the path's own ends, with the sign of `span`; [m] or natural logarithm.
+
+    Of what acts for less than a tenth of the time the ends are its extremes: it is away from its usual place for less
+    than what quantiles show.
+    """
+    path, static = coarse.strength(effect)[coarse.timeline.valid], span(coarse, effect)
+    low, high = _ends(path)
+    reach = float(np.ptp(path))
+    away = np.abs(path - np.median(path)) > 0.5 * reach
+    if away.mean() < 2.0 * DRIVING_QUANTILES[0] and high - low < 0.5 * abs(static):
+        low, high = path.min(), path.max()
+    return float(np.copysign(high - low, static))
 
 
 def _ends(values: FloatArray) -> FloatArray:

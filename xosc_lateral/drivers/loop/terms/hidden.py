@@ -17,19 +17,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import Search, beside
+from xosc_lateral.drivers.loop.drives import counted
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
 from xosc_lateral.drivers.loop.residual import OSCILLATION
-from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, MINIMUM_P, LoopSeed, in_another_order, upper_tail
+from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
 from xosc_lateral.drivers.loop.terms import spread
 from xosc_lateral.drivers.loop.terms.column import columns_on_size
-from xosc_lateral.drivers.loop.timeline import MIN_DRIFT_S, Coarse, on_fine_grid
+from xosc_lateral.drivers.loop.timeline import Coarse, on_fine_grid
 from xosc_lateral.drivers.model.effects import Acts, Cycle, Effect, Regimes
 from xosc_lateral.drivers.model.seeds import generator
 
@@ -196,7 +198,9 @@ def probability_of_persistence(
 PERIODS_S = (4.0, 60.0)  # Periods that are tested. [s]
 # Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]
 WIDTHS = (1, 3, 7)
-SURROUNDINGS = 60  # Frequencies to each side that say how high the spectrum is without a cycle. [-]
+SURROUNDINGS_HZ = 0.035  # To each side: how high the spectrum is without a cycle. [Hz]
+LINE_MARGIN = 5  # Frequencies to each side of a line that have some of it, where a window is not whole periods. [-]
+LINE_DRAWS = 400  # White tables that the highest line is compared with.
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,17 +227,16 @@ class CycleTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Highest spectral line of the whitened residual over its surroundings (F test), per long enough drive."""
+        """Highest line of the innovations' spectra, summed over drives, over its surroundings; null: white rows."""
         coarse = fitted.coarse
         if any(isinstance(term, cls) for term in fitted.terms):
             return None
-        drives = [coarse.drive == index for index in range(coarse.drives)]
-        lasting = [rows for rows in drives if coarse.valid[rows].sum() >= MIN_DRIFT_S]
-        outcomes = [_line(fitted.innovations[rows], width) for rows in lasting for width in WIDTHS]
-        if not outcomes:
+        lasting = coarse.valid & (counted(coarse) > 0.0)[coarse.drive]
+        if not lasting.any():
             return None
-        p_value, frequency, width = min(outcomes)
-        return Outcome(cls(frequency, width), (), min(1.0, p_value * len(outcomes)))
+        rng = generator(search.seed, LoopSeed.CYCLE)
+        p_value, frequency, width = line(np.where(lasting, fitted.innovations, 0.0), lasting, coarse.drive, rng)
+        return Outcome(cls(frequency, width), (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same period."""
@@ -258,17 +261,40 @@ class CycleTerm(Term):
         return Description("weave", shape, effect.amplitude, effect.amplitude_error, OSCILLATION)
 
 
-def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:
-    """p-value over all frequencies, the best frequency, the width."""
-    from scipy.stats import f
+def line(rows: FloatArray, valid: BoolArray, drive: IndexArray, rng: np.random.Generator) -> tuple[float, float, int]:
+    """p-value over all frequencies and widths, the best frequency [1/s], its width.
 
-    power = np.abs(np.fft.rfft(rows)) ** 2 / max(float(rows @ rows), 1e-12)
-    frequency = np.fft.rfftfreq(len(rows))
+    White rows, shape (n,), 0 where invalid. Each drive has one spectrum, and all are summed: a cycle keeps its period
+    from drive to drive, and its phase not.
+    """
+    edges = np.flatnonzero(np.diff(drive, prepend=-1, append=-1))
+    spans = [slice(*pair) for pair in pairwise(edges) if valid[slice(*pair)].any()]
+    size = 2 ** int(np.ceil(np.log2(max(span.stop - span.start for span in spans))))
+    frequency = np.fft.rfftfreq(size)
     band = (frequency >= 1.0 / PERIODS_S[1]) & (frequency <= 1.0 / PERIODS_S[0])
-    window, gap = np.ones(width), 2 * width + 11
-    around = np.convolve(power, np.ones(2 * SURROUNDINGS + 1), "same") - np.convolve(power, np.ones(gap), "same")
-    others = 2 * SURROUNDINGS + 1 - gap
-    ratio = np.where(band, np.convolve(power, window, "same") / np.maximum(around / others, 1e-12), 0.0)
-    at = int(np.argmax(ratio))
-    single = float(f.sf(ratio[at] / width, 2 * width, 2 * others))
-    return max(single * int(band.sum()), MINIMUM_P), float(frequency[at]), width
+    beyond = max(round(SURROUNDINGS_HZ * size), 2 * max(WIDTHS))
+
+    def ratios(values: FloatArray) -> list[FloatArray]:
+        """Line over surroundings in the band, shape (k, frequencies), of each width; `values` of shape (k, n)."""
+        powers = [np.abs(np.fft.rfft(values[:, span], size)) ** 2 for span in spans]
+        sizes = [np.maximum(np.square(values[:, span]).sum(axis=1), 1e-300)[:, None] for span in spans]
+        sums = np.cumsum(np.pad(np.sum(np.divide(powers, sizes), axis=0), ((0, 0), (beyond + 1, beyond))), axis=1)
+
+        def near(half: int) -> FloatArray:
+            middle = beyond + 1 + np.flatnonzero(band)
+            return np.asarray(sums[:, middle + half] - sums[:, middle - half - 1])
+
+        own = [min(width // 2 + LINE_MARGIN, beyond - 1) for width in WIDTHS]
+        return [
+            near(width // 2) / np.maximum((near(beyond) - near(gap)) / (2 * (beyond - gap)) * width, 1e-300)
+            for width, gap in zip(WIDTHS, own, strict=True)
+        ]
+
+    seen = ratios(rows[None])
+    null = ratios(np.where(valid, rng.normal(size=(LINE_DRAWS, len(rows))), 0.0))
+    tests = [
+        upper_tail(float(one.max()), other.max(axis=1), least_excess=0.0) for one, other in zip(seen, null, strict=True)
+    ]
+    best = int(np.argmin(tests))
+    at = float(frequency[band][np.argmax(seen[best][0])])
+    return min(1.0, tests[best] * len(WIDTHS)), at, WIDTHS[best]

@@ -178,12 +178,16 @@ RESPONSE_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class CourseTerm(MeanTerm):
-    """Mean offset by a column's course: generalised least squares on whitened offsets, one column per delay."""
+    """Mean offset by a column's course: generalised least squares on whitened offsets, one column per delay.
+
+    Of a shape with several coefficients (a curve, levels) the course is that of the sum that was fitted before.
+    """
 
     component: ClassVar[str] = "course"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY, Stage.MEAN_AGAIN)
     place: ClassVar[int] = 1
     weight: ClassVar[float] = 3.0
+    mix: tuple[float, ...] = (1.0,)  # Weight of each component of the quantity; all keep it at every delay.
 
     @property
     def kind_key(self) -> str:
@@ -192,7 +196,7 @@ class CourseTerm(MeanTerm):
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """The response at every delay, less its mean, shape (n, delays). [unit of the quantity]"""
-        moved = tents(coarse_mean(coarse.fine_response(self.effect))[:, 0], coarse.drive)
+        moved = tents(coarse_mean(coarse.fine_response(self.effect)) @ np.asarray(self.mix), coarse.drive)
         return np.asarray(moved - moved[coarse.valid].mean(axis=0))
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
@@ -212,8 +216,10 @@ class CourseTerm(MeanTerm):
             return outcome
         rest = [term for term in fitted.terms if term is not former]
         members = [one for one in search.plain_candidates() if one.columns == checked.columns]
-        shapes = [former.effect] if former else [one.effect for one in members]
-        terms = [cls.of(structs.replace(shape, lag_s=0.0, response_s=RESPONSE_S)) for shape in shapes]
+        shapes = [(one.effect, np.ones(1)) for one in members]
+        if former is not None:
+            shapes = [(former.effect, fitted.sizes[fitted.mean_part(former)])]
+        terms = [cls.over_time(effect, sizes) for effect, sizes in shapes]
         fits = [fit_model(fitted.coarse, (*rest, term)) for term in terms]
         if not fits:
             return outcome
@@ -221,6 +227,13 @@ class CourseTerm(MeanTerm):
         if grows(fitted, fits[best]) or fits[best].log_likelihood < fitted.log_likelihood:
             return outcome
         return replace(outcome, term=terms[best], after=fits[best], instead_of=former)
+
+    @classmethod
+    def over_time(cls, effect: ColumnEffect, sizes: FloatArray) -> CourseTerm:
+        """A term of an effect's column in its shape, its components in proportion to their sizes, shape (k,)."""
+        timed = structs.replace(effect, lag_s=0.0, response_s=RESPONSE_S, response_order=1, course=())
+        mix = sizes / max(float(np.abs(sizes).max()), 1e-300)
+        return replace(cls.of(timed), mix=tuple(mix.tolist()))
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of its column by any course beside the terms fitted."""
@@ -237,10 +250,10 @@ class CourseTerm(MeanTerm):
         effect = structs.replace(
             sized,
             acts=Acts.LOCATION,
-            coefficients=(total,),
-            errors=(total * self._passage(fitted, sizes, covariance).share_of_error,),
-            reference=(float(response.mean()),),
-            response_range=((float(response.min()), float(response.max())),),
+            coefficients=tuple(total * np.asarray(self.mix)),
+            errors=tuple(total * np.abs(self.mix) * self._passage(fitted, sizes, covariance).share_of_error),
+            reference=tuple(response.mean(axis=0)),
+            response_range=tuple(zip(response.min(axis=0).tolist(), response.max(axis=0).tolist(), strict=True)),
         )
         return (effect,)
 
@@ -250,7 +263,7 @@ class CourseTerm(MeanTerm):
         described = super().describe(fitted, effects, key)
         size, error = passage.largest_shift
         over_time = replace(described, shape=f"{described.shape}, over time", lag_s=None, response_s=None)
-        return replace(over_time, size_m=size, size_error=error, passage=passage)
+        return replace(over_time, size_m=size, size_error=error, static_gain=None, passage=passage)
 
     def _weights(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
         """Gain at each delay and its covariance, smooth as far as the rows leave it open. [m] per unit"""
@@ -260,7 +273,7 @@ class CourseTerm(MeanTerm):
     def _passage(self, fitted: Fitted, sizes: FloatArray, covariance: FloatArray) -> Passage:
         passage, step = typical_passage(fitted.coarse, self.effect), fitted.coarse.timeline.step
         quantity = coarse_mean(self.effect.response(step, {self.effect.columns[0]: passage.column}))
-        moved = tents(quantity[:, 0], np.zeros(len(quantity), dtype=np.intp))
+        moved = tents(quantity @ np.asarray(self.mix), np.zeros(len(quantity), dtype=np.intp))
         moved = moved - moved[0]
         error = np.sqrt(np.sum((moved @ covariance) * moved, axis=1))
         return replace(passage, path=moved @ sizes, error=error)

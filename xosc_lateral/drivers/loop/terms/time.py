@@ -21,13 +21,21 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.loop import low_frequencies as low
 from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
+from xosc_lateral.drivers.loop.drives import (
+    MEAN_INFLATION,
+    SPREAD_INFLATION,
+    Pooled,
+    counted,
+    own_time,
+    slope_alike,
+)
+from xosc_lateral.drivers.loop.model import CLIP, Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms import spread
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, columns_on_size
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.timeline import COARSE, Coarse
+from xosc_lateral.drivers.loop.timeline import COARSE, MIN_DRIFT_S, MIN_VALID_S, Coarse
 from xosc_lateral.drivers.model.effects import Acts, Effect, Step, TimeSmooth
 from xosc_lateral.drivers.model.seeds import generator
 
@@ -76,8 +84,13 @@ class StepTerm(_MeanByTime):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Step or smooth, whichever is likelier, each parameter at Schwarz's price (Annals of Statistics 6, 1978)."""
         coarse = fitted.coarse
-        if not coarse.lasts or any(isinstance(term, _MeanByTime) for term in fitted.terms):
+        if any(isinstance(term, _MeanByTime) for term in fitted.terms):
             return None
+        alike = mean_alike(fitted)
+        if not coarse.lasts:  # short drives say which way they go, one by one, and nothing of the form
+            if alike is None:
+                return None
+            return _unless_unlike(cls, search, fitted, alike, Outcome(TimeMeanTerm(), (), alike.p_value))
         rows, whitener = low.slow_rows(fitted)
         moments = low.step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
@@ -87,7 +100,7 @@ class StepTerm(_MeanByTime):
         )
         p_value = low.mean_probability(slow[:, 0], waves, jumps, generator(search.seed, LoopSeed.LOW_FREQUENCY))
         if not len(moments):
-            return Outcome(TimeMeanTerm(), (), p_value)
+            return _unless_unlike(cls, search, fitted, alike, Outcome(TimeMeanTerm(), (), p_value))
         unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
         step = cls(low.moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
         smooth = low.smooth_probabilities(slow[:, 0], waves, low.ORDERS)
@@ -206,12 +219,14 @@ class TimeSpreadTerm(Term):
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """The slowest half cosines of the squares beside those that are a little quicker, by an F test."""
-        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+        alike_in_all = spread_alike(fitted)
+        if (not fitted.coarse.lasts and alike_in_all is None) or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
         known = search.cross_basis(columns_on_size(fitted))
         may_act, p_column = spread.what_a_column_may_do(search, fitted)
         columns = low.half_cosines_of(fitted.coarse, max(low.SPREAD_ORDERS))
+        least_s = MIN_DRIFT_S if alike_in_all is None else MIN_VALID_S
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             tested = []
@@ -220,7 +235,7 @@ class TimeSpreadTerm(Term):
                 constant = np.ones(valid.sum())
                 both[valid] = beside(orthonormal(np.column_stack([constant, known[valid]])), both[valid])
                 parts = (both[:, :1], both[:, 1:])
-                rows, basis = (low.low_frequencies(own, fitted.coarse, valid, low.SHORTEST_S) for own in parts)
+                rows, basis = (low.low_frequencies(own, fitted.coarse, valid, low.SHORTEST_S, least_s) for own in parts)
                 tests = low.smooth_probabilities(rows[:, 0], basis, low.SPREAD_ORDERS)
                 tested += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(tested)[0] * len(tested)), min(tested)[1]) if tested else None
@@ -235,7 +250,7 @@ class TimeSpreadTerm(Term):
         if not slow and cls.passes(search, p_value, fitted):
             by_time = max(_priced(fitted, cls(order), order) for order in low.SPREAD_ORDERS)
             alike = _columns_as_likely(search, fitted, spread.SpreadTerm, by_time)
-        return Outcome(cls(slow=slow, alike=alike), (), p_value)
+        return _unless_unlike(cls, search, fitted, alike_in_all, Outcome(cls(slow=slow, alike=alike), (), p_value))
 
     def matches(self, other: Self) -> bool:
         """Whichever movement changes."""
@@ -276,6 +291,45 @@ class TimeSpreadTerm(Term):
         size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
         factor = float(np.exp(size))
         return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
+
+
+ALIKE = 0.05  # Level of the second question: does it change in every drive alike? [-]
+
+
+def mean_alike(fitted: Fitted) -> Pooled | None:
+    """Slope of the mean by time that all drives have in common [m/s]; None: fewer than three drives."""
+    rows, whitener = low.slow_rows(fitted)
+    return slope_alike(rows, whitener.rows(own_time(fitted.coarse)), fitted.coarse, MEAN_INFLATION)
+
+
+def spread_alike(fitted: Fitted) -> Pooled | None:
+    """The same of the logarithm of the spread. [1/s]"""
+    coarse, squares = fitted.coarse, spread.quick_squares(fitted)
+    problem = spread.of_squares(coarse, squares, spread.known_log_scale(fitted))
+    rows, column = (problem.whitener.rows(one) for one in (problem.series, own_time(coarse)))
+    pooled = slope_alike(rows, column, coarse, SPREAD_INFLATION)
+    clipped = np.minimum(squares.values, CLIP)[squares.valid]
+    unit = 0.5 * float(clipped.std() / max(float(clipped.mean()), 1e-300))  # of a square to that of a logarithm
+    if pooled is None:
+        return None
+    # each drive's own slowest half cosine beside those that are a little quicker
+    waves = np.cos(np.pi * own_time(coarse) / np.maximum(counted(coarse), 1.0)[coarse.drive])
+    each = waves[:, None] * (coarse.drive[:, None] == np.flatnonzero(counted(coarse)))
+    slow, basis = (
+        low.low_frequencies(one, coarse, squares.valid, low.SHORTEST_S, MIN_VALID_S)
+        for one in (squares.standardised[:, None], each)
+    )
+    within = low.smooth_probabilities(slow[:, 0], basis, (basis.shape[1],)).get(basis.shape[1], 1.0)
+    return replace(pooled, size=unit * pooled.size, error=unit * pooled.error, within=within)
+
+
+def _unless_unlike(kind: type[Term], search: Search, fitted: Fitted, alike: Pooled | None, outcome: Outcome) -> Outcome:
+    """Something changes within drives; unless it does so in all of them alike, a profile can't say when."""
+    passes = kind.passes(search, outcome.p_value, fitted)
+    if alike is None or (passes and alike.p_value <= ALIKE):
+        return outcome
+    own_way = min(alike.within, outcome.p_value if passes else 1.0)
+    return replace(outcome, term=None, own_way=own_way if kind.passes(search, own_way, fitted) else None)
 
 
 def _named(form: str, others: tuple[str, ...], when: str) -> tuple[str, str]:
