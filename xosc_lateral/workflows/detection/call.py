@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.detection.detectors import Detector
     from xosc_lateral.workflows.detection.observation import Sensor, View
     from xosc_lateral.workflows.detection.sources import SourceSettings
+    from xosc_lateral.workflows.detection.tuning import Learner
 
 ALL_RULES = "all"
 TRAINED_RULE = "logistic"
@@ -44,6 +45,12 @@ def detect(
         help="What logistic is trained on; may be repeated.")] = (),
     sensor: Annotated[str | Sensor, flag(kind=str, read=_known_sensor, metavar="noise=M,delay=S,rate=HZ",
         help="What detectors see through; usual: 0.05, 0.1, 20.")] = "",
+    tune: Annotated[str, flag(metavar="N/h|N%",
+        help="Set thresholds on the homes: at most so many false alarms an hour (20/h), or so many cut-ins seen before "
+        "the marking (95%).")] = "",
+    home: Annotated[Paths, flag(kind=list[Path] | None, metavar="SOURCE",
+        help="With --tune: what thresholds are set on, and logistic is trained on; each for itself; may be "
+        "repeated.")] = (),
     threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
     answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
     seed: int = 0,
@@ -66,6 +73,10 @@ def detect(
         test, else none.
     variants : int
         Lifelike variants of each scenario, with each of the profiles, counted beside the scenario as it is.
+    tune : str
+        "20/h", "95%": each home (with variants: as written, and lifelike) gives each detector a threshold, which is
+        tried on the sources. What is trained at home is set there on vehicles that it was not trained on. A source
+        that is a home too is tried with thresholds from its other vehicles.
     road : str or Path, optional
         OpenDRIVE file of a recording or table of states that comes without one, or in place of a scenario's.
 
@@ -81,14 +92,19 @@ def detect(
     from xosc_lateral.files.mapping import as_mapping
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.detection.detectors import Detector
     from xosc_lateral.workflows.detection.observation import read_sensor, views_of
     from xosc_lateral.workflows.detection.scoring import Tally
     from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
     from xosc_lateral.workflows.detection.tracks import moves_in_lane
+    from xosc_lateral.workflows.detection.tuning import in_order, read_goal, set_at_home
 
-    paths = as_paths(sources)
+    paths, homes, trainers = as_paths(sources), as_paths(home), as_paths(train)
     if not paths:
         raise ValueError("no source to look at")
+    if bool(tune) != bool(homes):
+        raise ValueError("--tune and --home belong together: to what thresholds are set, and where")
+    goal = read_goal(tune) if tune else None
     seen_with = read_sensor(sensor) if isinstance(sensor, str) else sensor
     requested = [detectors] if isinstance(detectors, str) else list(detectors)
     names = (profiles,) if isinstance(profiles, str) else tuple(profiles)
@@ -99,26 +115,37 @@ def detect(
     )
     settings = SourceSettings(convert, variants, names, ego, None if road is None else Path(road), as_mapping(columns))
     looked_at = [source for path in paths for source in sources_of(path, settings)]
-    trainers = as_paths(train)
-    chosen = [
-        detector
-        for word in requested
-        for detector in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed)
-    ]
-    needs_others = any(detector.needs_observer for detector in chosen)
+    known_homes = [source for path in homes for source in sources_of(path, settings)]
+    chosen: list[Detector | Learner] = []
+    for word in requested:
+        chosen += _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=bool(homes))
+    tried = [one for one in chosen if isinstance(one, Detector)]
+    own = dict[str, list[Tally]]()
+    if goal is not None:
+        tried = []
+        for source in known_homes:
+            views = [(scene, views_of(scene, seen_with, seed)) for scene in checked(source)]
+            within = any(source.is_same(each) for each in looked_at)
+            for one in chosen:
+                carrier, tally = set_at_home(goal, one, views, source.label, within=within)
+                tried.append(carrier)
+                own.setdefault(source.label, []).extend([] if tally is None else [tally])
+    needs_others = any(detector.needs_observer for detector in tried)
     tallies, still = list[Tally](), set[str]()
     for source in looked_at:
-        source_tallies = [Tally(detector, source.label) for detector in chosen]
+        at_home = own.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
+        elsewhere = [one for one in tried if not (at_home and one.home_source == source.label)]
+        source_tallies = [Tally(detector, source.label) for detector in elsewhere]
         moves = False
         for scene in checked(source):
-            views = views_of(scene, seen_with, seed, with_observers=needs_others)
-            moves = moves or any(moves_in_lane(view.track, view.truth) for view in views)
+            views_here = views_of(scene, seen_with, seed, with_observers=needs_others)
+            moves = moves or any(moves_in_lane(view.track, view.truth) for view in views_here)
             for tally in source_tallies:
-                tally.add(scene, views)
-        tallies += source_tallies
+                tally.add(scene, views_here)
+        tallies += in_order([*source_tallies, *at_home], [home.label for home in known_homes])
         still |= set() if moves else {source.label}
-    files = [path for path in (*paths, *trainers) if path.is_file()]
-    return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files)
+    files = [path for path in (*paths, *trainers, *homes) if path.is_file()]
+    return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files, goal, known_homes)
 
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
@@ -143,7 +170,10 @@ def _detectors(
     settings: SourceSettings,
     sensor: Sensor,
     seed: int,
-) -> Iterator[Detector]:
+    *,
+    at_home: bool,
+) -> Iterator[Detector | Learner]:
+    """Detectors of a word; what is still to be trained at home, as its learner."""
     from xosc_lateral.workflows.detection.detectors import RULES, Detector
     from xosc_lateral.workflows.detection.logistic import train
 
@@ -156,6 +186,10 @@ def _detectors(
         if not trainers:
             return
         detector = 0.5
+    set_first = detector
+    if not trainers and at_home:
+        yield lambda views, source: train(views, set_first, source)
+        return
     if not trainers:
         raise ValueError(f"{TRAINED_RULE} has to be trained: name a source with --train")
     as_they_are = replace(settings, variants=0)
