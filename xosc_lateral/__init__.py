@@ -53,6 +53,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
+    "Sight": "workflows.detection.sight",
     "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -107,6 +108,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Evaluation",
     "ClosedLoop",
     "Detection",
+    "Sight",
     "ImportedDrives",
     "XoscLateralError",
     "FormatError",
@@ -136,6 +138,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.detection.sight import Sight
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic

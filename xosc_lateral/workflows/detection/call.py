@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.detection.detectors import Detector
     from xosc_lateral.workflows.detection.observation import Sensor, View
+    from xosc_lateral.workflows.detection.sight import Sight
     from xosc_lateral.workflows.detection.sources import SourceSettings
     from xosc_lateral.workflows.detection.tuning import Learner
 
@@ -53,6 +54,8 @@ def detect(
         "repeated.")] = (),
     threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
     answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
+    sight: Annotated[bool, flag(
+        help="Range of vision instead: how often a vehicle sees the car before the car ahead.")] = False,
     seed: int = 0,
     road: Annotated[PathLike | None, flag("--road", kind=Path | None, show_default=False,
         help="OpenDRIVE file of a recording without one.")] = None,
@@ -61,7 +64,7 @@ def detect(
     allow: Paths = (),
     road_path: Paths = (),
     time_limit: float | None = None,
-) -> Detection:  # fmt: skip
+) -> Detection | Sight:  # fmt: skip
     """Count what cut-in detectors do on scenarios, drive tables and recordings, side by side.
 
     Parameters
@@ -95,6 +98,7 @@ def detect(
     from xosc_lateral.workflows.detection.detectors import Detector
     from xosc_lateral.workflows.detection.observation import read_sensor, views_of
     from xosc_lateral.workflows.detection.scoring import Tally
+    from xosc_lateral.workflows.detection.sight import sight_of
     from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
     from xosc_lateral.workflows.detection.tracks import moves_in_lane
     from xosc_lateral.workflows.detection.tuning import in_order, read_goal, set_at_home
@@ -115,6 +119,9 @@ def detect(
     )
     settings = SourceSettings(convert, variants, names, ego, None if road is None else Path(road), as_mapping(columns))
     looked_at = [source for path in paths for source in sources_of(path, settings)]
+    files = [path for path in (*paths, *trainers, *homes) if path.is_file()]
+    if sight:
+        return sight_of(looked_at, seed, files)
     known_homes = [source for path in homes for source in sources_of(path, settings)]
     chosen: list[Detector | Learner] = []
     for word in requested:
@@ -144,7 +151,6 @@ def detect(
                 tally.add(scene, views_here)
         tallies += in_order([*source_tallies, *at_home], [home.label for home in known_homes])
         still |= set() if moves else {source.label}
-    files = [path for path in (*paths, *trainers, *homes) if path.is_file()]
     return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files, goal, known_homes)
 
 
