@@ -54,7 +54,7 @@ def main() -> None:
     for row in result.rows():
         low, high = row["second_seen_low"], row["second_seen_high"]
         lines.append(
-            f"| {row['source']} | {row['sensor']} | {row['moments']} | {row['second_seen']:.0%} ({low:.0%} to {high:.0%}) "
+            f"| {row["source"]} | {row["sensor"]} | {row["moments"]} | {row['second_seen']:.0%} ({low:.0%} to {high:.0%}) "
             f"| {row['width_seen']:.0%} | {row['lane_seen']:.0f} m |"
         )
     show("\n".join(lines), args.write, "sight")
