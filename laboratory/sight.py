@@ -53,10 +53,8 @@ def main() -> None:
     lines = ["| traffic | sensor | moments | second car seen | its width seen | lane seen |", "|---" * 6 + "|"]
     for row in result.rows():
         low, high = row["second_seen_low"], row["second_seen_high"]
-        lines.append(
-            f"| {row["source"]} | {row["sensor"]} | {row["moments"]} | {row['second_seen']:.0%} ({low:.0%} to {high:.0%}) "
-            f"| {row['width_seen']:.0%} | {row['lane_seen']:.0f} m |"
-        )
+        cells = row["source"], row["sensor"], row["moments"], f"{row['second_seen']:.0%} ({low:.0%} to {high:.0%})"
+        lines.append("| {} | {} | {} | {} |".format(*cells) + f" {row['width_seen']:.0%} | {row['lane_seen']:.0f} m |")
     show("\n".join(lines), args.write, "sight")
     if args.figure is not None:
         result.plot().save(args.figure)

@@ -11,12 +11,14 @@ from xosc_lateral.workflows.options import PathLike, Paths, declare_options, fla
 from xosc_lateral.workflows.options import paths as as_paths
 
 if TYPE_CHECKING:
+    from xosc_lateral.drivers.evaluation.spectra import Spectrum
     from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.detection.detectors import Detector
     from xosc_lateral.workflows.detection.observation import Sensor, View
     from xosc_lateral.workflows.detection.sight import Sight
     from xosc_lateral.workflows.detection.sources import SourceSettings
+    from xosc_lateral.workflows.detection.tracks import Scene
     from xosc_lateral.workflows.detection.tuning import Learner
 
 ALL_RULES = "all"
@@ -52,6 +54,9 @@ def detect(
     home: Annotated[Paths, flag(kind=list[Path] | None, metavar="SOURCE",
         help="With --tune: what thresholds are set on, and logistic is trained on; each for itself; may be "
         "repeated.")] = (),
+    band_of: Annotated[PathLike | None, flag("--band-of", kind=Path | None, metavar="RECORDING", show_default=False,
+        help="With --tune: see the homes through the band of a recording, which shows less of fast "
+        "movement.")] = None,
     threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
     answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
     sight: Annotated[bool, flag(
@@ -108,6 +113,8 @@ def detect(
         raise ValueError("no source to look at")
     if bool(tune) != bool(homes):
         raise ValueError("--tune and --home belong together: to what thresholds are set, and where")
+    if band_of is not None and not homes:
+        raise ValueError("--band-of is what homes are seen through: name them with --home, and --tune")
     goal = read_goal(tune) if tune else None
     seen_with = read_sensor(sensor) if isinstance(sensor, str) else sensor
     requested = [detectors] if isinstance(detectors, str) else list(detectors)
@@ -119,7 +126,8 @@ def detect(
     )
     settings = SourceSettings(convert, variants, names, ego, None if road is None else Path(road), as_mapping(columns))
     looked_at = [source for path in paths for source in sources_of(path, settings)]
-    files = [path for path in (*paths, *trainers, *homes) if path.is_file()]
+    bands = () if band_of is None else (Path(band_of),)
+    files = [path for path in (*paths, *trainers, *homes, *bands) if path.is_file()]
     if sight:
         return sight_of(looked_at, seed, files)
     known_homes = [source for path in homes for source in sources_of(path, settings)]
@@ -130,8 +138,11 @@ def detect(
     own = dict[str, list[Tally]]()
     if goal is not None:
         tried = []
+        recorded = [band_source(path, settings) for path in bands]
         for source in known_homes:
-            views = [(scene, views_of(scene, seen_with, seed)) for scene in checked(source)]
+            scenes = list(checked(source))
+            at_home = seen_through(recorded[0], scenes, seen_with) if recorded else seen_with
+            views = [(scene, views_of(scene, at_home, seed)) for scene in scenes]
             within = any(source.is_same(each) for each in looked_at)
             for one in chosen:
                 carrier, tally = set_at_home(goal, one, views, source.label, within=within)
@@ -140,8 +151,8 @@ def detect(
     needs_others = any(detector.needs_observer for detector in tried)
     tallies, still = list[Tally](), set[str]()
     for source in looked_at:
-        at_home = own.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
-        elsewhere = [one for one in tried if not (at_home and one.home_source == source.label)]
+        itself = own.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
+        elsewhere = [one for one in tried if not (itself and one.home_source == source.label)]
         source_tallies = [Tally(detector, source.label) for detector in elsewhere]
         moves = False
         for scene in checked(source):
@@ -149,9 +160,26 @@ def detect(
             moves = moves or any(moves_in_lane(view.track, view.truth) for view in views_here)
             for tally in source_tallies:
                 tally.add(scene, views_here)
-        tallies += in_order([*source_tallies, *at_home], [home.label for home in known_homes])
+        tallies += in_order([*source_tallies, *itself], [home.label for home in known_homes])
         still |= set() if moves else {source.label}
     return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files, goal, known_homes)
+
+
+def band_source(path: Path, settings: SourceSettings) -> Spectrum:
+    """Spectrum of lane keeping of a recording."""
+    from xosc_lateral.workflows.detection.band import keeping_spectrum
+    from xosc_lateral.workflows.detection.sources import checked, sources_of
+
+    (source,) = sources_of(path, replace(settings, variants=0))
+    return keeping_spectrum((track for scene in checked(source) for track in scene.tracks), source.label)
+
+
+def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
+    """The sensor with the band that a recording leaves of what moves in these scenes."""
+    from xosc_lateral.workflows.detection.band import band_of, keeping_spectrum
+
+    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
+    return replace(sensor, band=band_of(recorded, home))
 
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
