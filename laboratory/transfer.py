@@ -180,9 +180,9 @@ def results(wheel: Path, half: int, seed: int, folder: Path) -> Iterator[dict[st
                 yield {**key, "threshold": detector.threshold, **at(detector, tested, "held out")}
 
 
-def lines_of(rows: Sequence[dict[str, Any]], goal: str, half: int | None = None) -> str:
-    """Means over seeds and halves; in brackets the smallest and the largest."""
-    found = [row for row in rows if row["goal"] == goal and half in (None, row["half"])]
+def lines_of(rows: Sequence[dict[str, Any]], goal: str) -> str:
+    """Means over seeds and halves; in brackets the smallest and the largest lower and upper end of a 95 % interval."""
+    found = [row for row in rows if row["goal"] == goal]
     homes, names = ("nominal", "lifelike", "real"), list(dict.fromkeys(row["detector"] for row in found))
     lines = ["| detector | " + " | ".join(f"set up on {home}" for home in homes) + " |", "|---" * 4 + "|"]
     for name in names:
@@ -193,10 +193,9 @@ def lines_of(rows: Sequence[dict[str, Any]], goal: str, half: int | None = None)
                 cells.append("-")
                 continue
             rates = [row["rate"] for row in each]
+            low, high = min(row["low"] for row in each), max(row["high"] for row in each)
             seen, lead = (np.nanmean([row[key] for row in each]) for key in ("seen", "lead"))
-            cells.append(
-                f"{np.mean(rates):.0f} ({min(rates):.0f} to {max(rates):.0f}); {100.0 * seen:.0f} %; {lead:.2f} s"
-            )
+            cells.append(f"{np.mean(rates):.0f} ({low:.0f} to {high:.0f}); {100.0 * seen:.0f} %; {lead:.2f} s")
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -216,6 +215,9 @@ def main() -> None:
                     with args.results.open("a", encoding="utf-8") as file:
                         file.write(json.dumps(row) + "\n")
     rows = [json.loads(line) for line in args.results.read_text(encoding="utf-8").splitlines()]
+    last = {(row["half"], row["seed"]) for row in rows if (row["home"], row["detector"]) == ("real", LEARNERS[-1])}
+    rows = [row for row in rows if (row["half"], row["seed"]) in last]  # others are not complete
+    print(f"{len(last)} of home half and seed: {sorted(last)}")
     for goal, marker in (("20/h", "rate"), ("95%", "share"), ("p = 0.5", "half")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
 
