@@ -138,6 +138,8 @@ def test_the_same_source_as_home_and_tried_is_set_on_other_vehicles(folder):
     ("words", "what"),
     [
         ("--tune 20/h", "--tune and --home belong together"),
+        ("--tune 20/h --home home --train home --detector logistic", "--train names a home"),
+        ("--tune 20/h --home home --home home", "two homes are called 'home'"),
         ("--home home", "--tune and --home belong together"),
         ("--tune 20 --home home", "'20': expected false alarms an hour as in 20/h"),
         ("--tune 0/h --home home", "'0/h'"),

@@ -113,6 +113,8 @@ def detect(
         raise ValueError("no source to look at")
     if bool(tune) != bool(homes):
         raise ValueError("--tune and --home belong together: to what thresholds are set, and where")
+    if {*map(Path.resolve, trainers)} & {*map(Path.resolve, homes)}:
+        raise ValueError("--train names a home: without it, logistic is trained there and set on other vehicles")
     if band_of is not None and not homes:
         raise ValueError("--band-of is what homes are seen through: name them with --home, and --tune")
     goal = read_goal(tune) if tune else None
@@ -131,10 +133,14 @@ def detect(
     if sight:
         return sight_of(looked_at, seed, files)
     known_homes = [source for path in homes for source in sources_of(path, settings)]
+    labels = [source.label for source in known_homes]
+    if twice := sorted({label for label in labels if labels.count(label) > 1}):
+        raise ValueError(f"two homes are called {twice[0]!r}, which rows could not tell apart")
     chosen: list[Detector | Learner] = []
     for word in requested:
         chosen += _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=bool(homes))
     tried = [one for one in chosen if isinstance(one, Detector)]
+    needs_others = any(detector.needs_observer for detector in tried)
     own = dict[str, list[Tally]]()
     if goal is not None:
         tried = []
@@ -142,13 +148,12 @@ def detect(
         for source in known_homes:
             scenes = list(checked(source))
             at_home = seen_through(recorded[0], scenes, seen_with) if recorded else seen_with
-            views = [(scene, views_of(scene, at_home, seed)) for scene in scenes]
+            views = [(scene, views_of(scene, at_home, seed, with_observers=needs_others)) for scene in scenes]
             within = any(source.is_same(each) for each in looked_at)
             for one in chosen:
                 carrier, tally = set_at_home(goal, one, views, source.label, within=within)
                 tried.append(carrier)
                 own.setdefault(source.label, []).extend([] if tally is None else [tally])
-    needs_others = any(detector.needs_observer for detector in tried)
     tallies, still = list[Tally](), set[str]()
     for source in looked_at:
         itself = own.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
@@ -160,7 +165,7 @@ def detect(
             moves = moves or any(moves_in_lane(view.track, view.truth) for view in views_here)
             for tally in source_tallies:
                 tally.add(scene, views_here)
-        tallies += in_order([*source_tallies, *itself], [home.label for home in known_homes])
+        tallies += in_order([*source_tallies, *itself], labels)
         still |= set() if moves else {source.label}
     return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files, goal, known_homes)
 
