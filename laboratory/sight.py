@@ -2,7 +2,8 @@
 
     python -m laboratory.sight WHEEL [--profile motorway] [--write PAGE.md] [--figure FIGURE.svg]
 
-Everything but the offset in lane keeping is the recording's in all three, lane changes too.
+Everything but the lateral position within the lane is the recording's in all three; only in the recorded one are lane
+changes seen in it.
 """
 
 from __future__ import annotations
@@ -17,12 +18,11 @@ import xosc_lateral as xl
 from laboratory.detectors import recorded
 from laboratory.markers import show
 from xosc_lateral.workflows.detection.sight import Sight, moments_of
-from xosc_lateral.workflows.detection.tracks import LaneTrack, Scene, truth_of
+from xosc_lateral.workflows.detection.tracks import LaneTrack, Scene
 
 
 def moved(track: LaneTrack, offset: np.ndarray) -> LaneTrack:
-    """With other offsets from its lane's centre while it keeps its lane."""
-    offset = np.where(truth_of(track).keeping, offset, track.offset)
+    """With other offsets from its lane's centre."""
     along, by = track.heading - track.heading_relative, offset - track.offset
     return track.having(offset=offset, x=track.x - by * np.sin(along), y=track.y + by * np.cos(along))
 
