@@ -86,9 +86,8 @@ docs: $(DOCS_STAMP)
 schema: $(STAMP)
 	$(BIN)/python -m tests.kit.schema
 
-# The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI). `motorway` and `rural` in the tree are
-# older than the last change of how limits are fitted: a lower limit moves by up to 0.03 of the lane's width, coefficients
-# by up to 1e-3. What the closed loop made stays as it is; `make refined` makes it anew.
+# The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI), byte for byte. What the closed loop
+# made stays as it is; `make refined` makes it anew.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 # GNSS: the files of OpenACC's AstaZero campaign, from its catalogue (docs/real_data.md).
 GNSS ?= ASta_040719_platoon3.csv ASta_050719_platoon1.csv

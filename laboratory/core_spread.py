@@ -25,8 +25,8 @@ from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, all_runs
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coarse
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
-from xosc_lateral.drivers.fitting.models.autoregressive_coarse import fit_autoregression
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate
+from xosc_lateral.drivers.fitting.models.likelihood import fit_autoregression
 from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, stabilise
@@ -50,9 +50,9 @@ def calm_moments(seconds: float) -> Fit:
     """Each moment weighted by how calm its surroundings are, as the fit did at first (with 10 s)."""
 
     def weighted(
-        runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str], between: float
-    ) -> Autoregression:
-        first = fit_autoregression(runs, order, every=every, drivers=drivers, between=between)
+        runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str]
+    ) -> tuple[Autoregression, float]:
+        first, between = fit_autoregression(runs, order, every=every, drivers=drivers)
         coefficients = first.coefficients
         long = [run for run in runs if len(run) > every * (order + 1)]
         pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
@@ -66,7 +66,7 @@ def calm_moments(seconds: float) -> Fit:
                 normal += (past * weight[:, None]).T @ past
                 right += (past * weight[:, None]).T @ value
             coefficients = np.linalg.solve(normal, right)
-        return Autoregression(stabilise(coefficients), first.scale)
+        return Autoregression(stabilise(coefficients), first.scale), between
 
     def fit(runs: Sequence[FloatArray]) -> AutoregressiveModel:
         with patch.object(fit_coarse, "fit_autoregression", weighted):

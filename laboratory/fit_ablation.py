@@ -25,8 +25,9 @@ from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import snippet_distances, split_groups
 from xosc_lateral.drivers.fitting.fitting import driver_runs
-from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS, fit_autoregression
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
+from xosc_lateral.drivers.fitting.models.likelihood import fit_autoregression
 from xosc_lateral.drivers.model.core.autoregressive.parameters import COARSE_EVERY, split_bands
 from xosc_lateral.files.drives import read_drives
 
@@ -78,7 +79,7 @@ def _errors(order: int, runs: Sequence[Run], slow: Sequence[FloatArray], fold: d
     sums: dict[str, list[float]] = {name: [0.0, 0.0] for name in fold}
     for number in range(FOLDS):
         train = [k for k, run in enumerate(runs) if fold[run.drive] != number]
-        model = fit_autoregression(
+        model, _ = fit_autoregression(
             [slow[k] for k in train], order, every=COARSE_EVERY, drivers=[runs[k].drive for k in train]
         )
         for run, series in zip(runs, slow, strict=True):

@@ -275,7 +275,7 @@ def test_a_full_disk_names_the_output(tmp_path, capsys, monkeypatch):
     write_template("cut-in", tmp_path)
     monkeypatch.setattr(Path, "replace", full)
     line = refused(["play", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
-    assert line == f"xosc-lateral: {tmp_path}/states.csv.json: no space left on device\n"
+    assert line == f"xosc-lateral: {tmp_path}/states.csv: no space left on device\n"
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ from tests.kit.scenario_files import (
     time_condition,
     write_scenario,
 )
+from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, PlaybackError
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.opendrive.reader import read_opendrive
@@ -35,9 +36,10 @@ from xosc_lateral.files.openscenario.provenance import provenance_of
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
+from xosc_lateral.files.openscenario.write.reactive import LateralActions
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain, OffsetPath, ring_along
+from xosc_lateral.world.motion.offset_path import OffsetPath, approached, pieces_along, spacing_of
+from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.position import Polyline, WorldPosition
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
@@ -83,11 +85,9 @@ def converted(scenario: Scenario, output: Path, **overrides: Any) -> WrittenScen
     )
 
 
-def reactive(scenario: Scenario, motion: NominalMotion, chains: list[OffsetChain], output: Path) -> WrittenScenario:
-    """Nobody on a trajectory: maneuvers stay, and lane offsets are added."""
-    return write_converted(
-        scenario, motion, {}, output, chains=chains, provenance=provenance(scenario), summary="seed 3"
-    )
+def reactive(scenario: Scenario, motion: NominalMotion, paths: list[OffsetPath], output: Path) -> WrittenScenario:
+    """Nobody on a trajectory: maneuvers stay, and paths are added."""
+    return write_converted(scenario, motion, {}, output, paths=paths, provenance=provenance(scenario), summary="seed 3")
 
 
 def vertices(scenario: Scenario) -> list[np.ndarray]:
@@ -330,11 +330,17 @@ def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
     assert not (tmp_path / "out.xosc").exists()
 
 
-def sine_chain(entity_name: str, after: tuple[str, ...] | None = None) -> OffsetChain:
-    """20 cm to each side every 8 s; from the start, it begins at the left turn."""
-    time = np.arange(0.0, 40.0, 0.1)
-    ring = ring_along(time, 0.2 * np.sin(2 * np.pi * time / 8.0), from_middle=False)
-    return OffsetChain(entity_name, after, ring, None if after else ring.origin)
+def sine_path(entity_name: str, after: tuple[str, ...] | None = None, *, length: float = 1500.0) -> OffsetPath:
+    """20 cm to each side every 200 m, from the left turn on."""
+    distance = np.arange(0.0, length, 5.0)
+    spacing = spacing_of(distance, np.full(len(distance), 25.0), np.zeros(len(distance)))
+    offset = approached(sine, 0.0, 0.0, 100.0) if after else sine
+    pieces = tuple(pieces_along(offset, spacing, [0.0, length], calm_end=False))
+    return OffsetPath(entity_name, after, pieces, placed_t=None if after else 0.2, start=0.2)
+
+
+def sine(distance: FloatArray) -> FloatArray:
+    return np.asarray(0.2 * np.cos(2 * np.pi * distance / 200.0))
 
 
 @pytest.mark.parametrize("minor", [0, 1, 2, 3])
@@ -343,7 +349,7 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
 ) -> None:
     scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=minor)))
     motion = played(scenario)
-    reactive(scenario, motion, [sine_chain("Ego")], tmp_path / "out.xosc")
+    reactive(scenario, motion, [sine_path("Ego")], tmp_path / "out.xosc")
     schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
     again = read_scenario(tmp_path / "out.xosc")
     assert [found.name for found in again.storyboard.stories] == ["story", "xosc-lateral"]
@@ -351,27 +357,23 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
     assert len(set(names)) == len(names)
 
 
-def test_offsets_come_out_when_the_lane_offset_scenario_is_played_and_go_on(tmp_path: Path) -> None:
-    """For longer than the ring, which has three periods of the sine, and at its pace."""
+def test_offsets_come_out_when_the_lane_offset_scenario_is_played(tmp_path: Path) -> None:
     nothing = "<UserDefinedAction><CustomCommandAction type='nothing'/></UserDefinedAction>"
     stories, init = story(event("nothing", action("nothing", nothing))), private("Ego", teleport(), speed_action("14"))
     scenario = made(tmp_path, stop=time_condition(60), init=init, stories=stories)
     motion = played(scenario, 70.0)
-    chain = sine_chain("Ego")
-    reactive(scenario, motion, [chain], tmp_path / "out.xosc")
+    path = sine_path("Ego")
+    reactive(scenario, motion, [path], tmp_path / "out.xosc")
     ego = played(read_scenario(tmp_path / "out.xosc"), 70.0).entities[0]
-    # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left. The ring begins at a turn.
-    assert ego.offset[0] == pytest.approx(chain.placed_t, abs=1e-4)
-    wanted = 0.2 * np.cos(2 * np.pi * (ego.time - 0.12) / 8.0)
-    assert np.abs(ego.offset - wanted)[ego.time < 16.0].max() < 0.025
-    for begin in (0.0, 20.0, 40.0):
-        rows = (ego.time >= begin) & (ego.time < begin + 20.0)
-        assert np.ptp(ego.offset[rows]) == pytest.approx(0.4, abs=0.03)
-    assert np.sqrt(np.mean(np.diff(ego.offset) ** 2)) / STEP == pytest.approx(0.2 * 2 * np.pi / 8.0 / 2**0.5, rel=0.05)
+    # Lane -1 of a right-hand road: the direction of travel is that of s, so +t is left.
+    assert ego.offset[0] == pytest.approx(0.2, abs=1e-4)
+    driven = ego.s - ego.s[0] - 14.0 * 0.2
+    assert np.abs(ego.offset - sine(driven))[driven > 60.0].max() < 0.003  # up to there it takes up its lateral speed
+    assert np.abs(ego.s - motion.entities[0].s).max() < 0.02
 
 
 def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_path: Path) -> None:
-    """Braking with 8 m/s2 to a stop, for 4 s, and on: no sliding, no turn that anybody sees; then the ring."""
+    """Braking with 8 m/s2 to a stop, for 4 s, and on: no sliding, no turn that anybody sees."""
 
     def change(value: float, rate: float) -> str:
         return speed_action(str(value)).replace(
@@ -385,24 +387,33 @@ def test_a_path_by_distance_stands_still_with_its_car_and_goes_on_with_it(tmp_pa
     )
     init = private("Ego", teleport(), speed_action("25"))
     scenario = made(tmp_path, stop=time_condition(35), init=init, stories=stories)
-    distance = np.arange(0.0, 400.0, 2.5)
-    offset = 0.2 * np.cos(2 * np.pi * distance / 200.0)
-    chain = sine_chain("Ego")
-    path = OffsetPath(tuple(distance.tolist()), tuple(np.round(offset, 4).tolist()))
-    chain = structs.replace(chain, placed_t=0.2, path=path)
     motion = played(scenario, 40.0)
-    reactive(scenario, motion, [chain], tmp_path / "out.xosc")
-    run = played(read_scenario(tmp_path / "out.xosc"), 40.0)
-    ego, nominal_ego = run.entities[0], motion.entities[0]
-    driven = ego.s - ego.s[0]
-    on_path = (ego.time > 0.2) & (driven < 390.0)
-    assert np.abs(ego.offset - np.interp(driven - 0.12 * 25.0, distance, offset))[on_path].max() < 0.003
+    reactive(scenario, motion, [sine_path("Ego")], tmp_path / "out.xosc")
+    ego, nominal_ego = played(read_scenario(tmp_path / "out.xosc"), 40.0).entities[0], motion.entities[0]
+    driven = ego.s - ego.s[0] - 0.2 * 25.0
+    assert np.abs(ego.offset - sine(driven))[driven > 60.0].max() < 0.003  # up to there it takes up its lateral speed
     still = ego.speed == 0.0
     assert still.sum() > 100 and np.ptp(ego.offset[still]) < 1e-9
-    assert np.abs(ego.heading_relative[on_path]).max() < 0.010
-    assert np.abs(ego.s - nominal_ego.s).max() < 0.01
-    after = driven > 420.0
-    assert after.sum() > 200 and np.ptp(ego.offset[after]) > 0.05
+    assert np.abs(ego.heading_relative).max() < 0.010
+    assert np.abs(ego.s - nominal_ego.s).max() < 0.02
+
+
+def test_a_path_ends_before_a_place_that_none_leads_over_and_another_begins_behind(tmp_path: Path) -> None:
+    """Also for whoever comes there from the other lane; and a run longer than a path goes on with the next."""
+    init = private("Ego", teleport(), speed_action("25"))
+    scenario = made(tmp_path, stop=time_condition(30), init=init)
+    motion = played(scenario, 40.0)
+    begin = float(motion.entities[0].s[0])
+    first = structs.replace(sine_path("Ego"), ends=(RoadPlace("1", begin + 230.0, -1.75),))
+    lanes = tuple(RoadPlace("1", begin + 300.0, t) for t in (-1.75, -5.25))
+    second = structs.replace(sine_path("Ego"), placed_t=None, places=lanes)
+    second = structs.replace(second, pieces=(second.pieces[0], second.pieces[0]))
+    reactive(scenario, motion, [first, second], tmp_path / "out.xosc")
+    ego = played(read_scenario(tmp_path / "out.xosc"), 40.0).entities[0]
+    driven, moves = ego.s - ego.s[0], np.abs(np.gradient(ego.offset, ego.time)) > 1e-4
+    assert moves[(driven > 20.0) & (driven < 80.0)].all()
+    assert not moves[(driven > 218.0) & (driven < 297.0)].any()
+    assert moves[(driven > 320.0) & (driven < 380.0)].all()
 
 
 LANE_CHANGE = (
@@ -428,8 +439,8 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
     scenario = read_scenario(write_scenario(tmp_path, text(8.01)))
     motion = played(scenario, 30.0)
     path = next(p.path for p in motion.actions if p.action.name == "change")
-    chains = [sine_chain("Ego"), sine_chain("Ego", path)]
-    reactive(scenario, motion, chains, tmp_path / "out.xosc")
+    paths = [sine_path("Ego"), sine_path("Ego", path)]
+    reactive(scenario, motion, paths, tmp_path / "out.xosc")
     # The test drive makes the change come 3 s earlier than planned.
     output = tmp_path / "out.xosc"
     output.write_text(output.read_text().replace('value="8.01"', 'value="5.01"'))
@@ -439,10 +450,10 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
     assert ego.lane[np.searchsorted(ego.time, 4.9)] == -1
     after = ego.time > 9.1
     assert set(ego.lane[after].tolist()) == {-2}
-    # The second chain starts with the end of the change, not at the planned time.
+    # The second path starts with the end of the change, not at the planned time.
     for begin in (9.5, 17.0):
         rows = (ego.time >= begin) & (ego.time < begin + 8.0)
-        assert np.ptp(ego.offset[rows]) > 0.3
+        assert np.ptp(ego.offset[rows]) > 0.2
 
 
 def test_a_scenario_that_is_over_at_once_is_refused(tmp_path: Path) -> None:

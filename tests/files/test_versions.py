@@ -205,7 +205,7 @@ def reactive(source: Path, version: str) -> Written:
         played(scenario),
         {},
         output,
-        chains=[],
+        paths=[],
         provenance={},
         summary="",
         target=target(version=version),

@@ -31,6 +31,7 @@ from xosc_lateral.drivers.model.effects import (
     TimeSmooth,
     VarianceTrend,
 )
+from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 
 STEP = 0.2
 
@@ -68,6 +69,7 @@ EXAMPLES: tuple[Effect, ...] = (
     Adapted(shift=-0.1, spread=1.2, rate=0.8, fine=1.5),
 )
 """One of each kind, of columns `x` and `y`: every test of all effects takes them from here."""
+OF_OTHER_COLUMNS: tuple[Effect, ...] = (JamCorridor(),)
 
 
 def made(kind: type[C], *coefficients: float, acts: Acts = Acts.LOCATION, **fields: Any) -> C:

@@ -8,11 +8,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.limits import CONTEXT_RANGES
 
 MINIMUM_SPEED = 40.0 / 3.6
-"""Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
+"""Below this drives are not fitted (Neis & Beyerer cut their data at 40 km/h), and movement has its own clock. [m/s]"""
 
 CONTEXT_UNITS: Mapping[str, str] = MappingProxyType({name: known.unit for name, known in CONTEXT_RANGES.items()})
 """Of the contexts that a scenario can supply by itself; NaN in their arrays where there is none (no vehicle ahead)."""
@@ -64,6 +64,14 @@ class Segment:
         """Free driving at one speed [m/s] in a lane of one width [m], for so long, at this step. [s]"""
         n = round(duration / step) + 1
         return cls(step * np.arange(n, dtype=np.float64), np.full(n, lane_width), np.full(n, speed))
+
+    def at(self, rows: IntArray) -> Segment:
+        """With these rows of its inside, shape (k,), a step apart in time, in place of all: as on another clock."""
+        around = np.arange(self.before), np.arange(self.inside.stop, len(self))
+        taken = np.concatenate((around[0], self.before + rows, around[1]))
+        time = self.time[0] + (self.time[1] - self.time[0]) * np.arange(len(taken))
+        context = {name: values[taken] for name, values in self.context.items()}
+        return Segment(time, self.lane_width[taken], self.speed[taken], context, self.before, self.after)
 
     def __len__(self) -> int:
         return len(self.time)

@@ -99,10 +99,10 @@ def _convert_one(
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
-    from xosc_lateral.files.output_paths import STDOUT, claim, output_file
+    from xosc_lateral.files.output_paths import STDOUT, claim, numbered, output_file
     from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
     from xosc_lateral.workflows.conversion.conversion import osi_files
-    from xosc_lateral.workflows.conversion.convert import convert, default_output, numbered, output_scenario
+    from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     def limited(target: Path | None, **more: Any) -> Conversion:

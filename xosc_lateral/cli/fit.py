@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Annotated
+from warnings import catch_warnings, simplefilter
 
 import typer
 
@@ -34,14 +35,16 @@ def fit(
     usual = options["name"] or tables[0].name.split(".")[0]
     (written,) = reply.claim(tables, profile=(output, f"{usual}.json"))
     options["name"] = options["name"] or (usual if written is None else written.stem)
-    profile = xl.fit(tables, **options)
+    with catch_warnings(record=True) as told:
+        simplefilter("always", UserWarning)
+        profile = xl.fit(tables, **options)
     if written is None:
         write_stdout(profile_bytes(profile))
     else:
         xl.write_profile(profile, written, force=reply.force)
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
-    warn(fit_warnings(profile, options.get("sensor_noise")))
+    warn([*(str(one.message) for one in told), *fit_warnings(profile, options.get("sensor_noise"))])
 
 
 @command(

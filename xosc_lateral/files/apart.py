@@ -72,7 +72,7 @@ def _asked(read: Callable[..., Any], args: tuple[Any, ...], keywords: dict[str, 
     timer, goes_on = threading.Timer(seconds, process.kill), False
     timer.start()
     try:
-        pickle.dump((read.__module__, read.__qualname__, args, keywords, seconds, size), requests)
+        pickle.dump((read.__module__, read.__qualname__, args, keywords, seconds, size, str(Path.cwd())), requests)
         requests.flush()
         made, error, parsed, goes_on = pickle.load(answers)
     except (EOFError, OSError, pickle.UnpicklingError) as broken:
@@ -117,9 +117,10 @@ def serve() -> None:
     sys.addaudithook(_refuse)
     while True:
         try:
-            module, name, args, keywords, seconds, size = pickle.load(requests)
+            module, name, args, keywords, seconds, size, folder = pickle.load(requests)
         except EOFError:
             return
+        os.chdir(folder)
         if hasattr(signal, "alarm"):
             signal.alarm(int(seconds) + 1)  # ends an orphan
         made: Any = None
@@ -136,7 +137,6 @@ def serve() -> None:
         goes_on = status_bytes(1) - begin < MUCH_MEMORY
         pickle.dump((made, error, parsed, goes_on), answers, protocol=5)
         answers.flush()
-        made = error = None
 
 
 def _refuse(event: str, _: object) -> None:

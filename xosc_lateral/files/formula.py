@@ -29,7 +29,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {name: getattr(np, name) for name 
 CONSTANTS = {"INF": np.inf, "NaN": np.nan}
 
 
-class FormulaError(ValueError):
+class FormulaError(Exception):
     """A formula that is none of this language."""
 
 
@@ -42,8 +42,6 @@ def evaluate(formula: str, raw: Any) -> FloatArray:
         with np.errstate(all="ignore"):
             made = _value(ast.parse(formula.strip(), mode="eval").body, {"X": values, "X1": values, **CONSTANTS})
         return np.array(np.broadcast_to(np.asarray(made, dtype=np.float64), values.shape))
-    except FormulaError:
-        raise
     except (SyntaxError, ValueError, TypeError, OverflowError, RecursionError, MemoryError) as error:
         raise FormulaError(f"{formula[:60]!r} is no arithmetic of X ({type(error).__name__})") from error
 

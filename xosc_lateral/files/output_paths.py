@@ -105,6 +105,14 @@ def real_path(path: Path, folders: dict[Path, str]) -> str:
     return f"{folders[folder].rstrip(os.sep)}{os.sep}{path.name}"
 
 
+def numbered(path: Path, variant_index: int, variants: int) -> Path:
+    """Path of one variant: as it is when there is one alone, else with its number, from 1, before the suffix."""
+    if variants == 1:
+        return path
+    digits = max(2, len(str(variants)))
+    return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")
+
+
 # ---- whether a file is one that this package wrote: each format says so in its own place
 SIDECAR_SUFFIX = ".json"  # beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers
 PACKAGE = b"xosc-lateral"

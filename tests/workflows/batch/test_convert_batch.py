@@ -79,8 +79,8 @@ def test_a_folder_becomes_a_folder_with_a_manifest(database: Path, tmp_path: Pat
     assert not [path for path in (tmp_path / "out").rglob("*") if path.name.startswith(".")]
 
 
-def test_roads_and_catalogs_resolve_from_where_the_output_is(database: Path, tmp_path: Path, run) -> None:
-    run(str(database), "-o", str(tmp_path / "else" / "where" / "out"))
+def test_roads_and_catalogs_resolve_from_where_the_output_is(database: Path, tmp_path: Path, profile: str) -> None:
+    xl.convert_many(database, tmp_path / "else" / "where" / "out", profile=profile, workers=0, time_limit=2.0)
     outputs = sorted((tmp_path / "else").rglob("*.xosc"))
     assert len(outputs) == 2
     for output in outputs:
@@ -90,13 +90,13 @@ def test_roads_and_catalogs_resolve_from_where_the_output_is(database: Path, tmp
 
 
 def test_two_processes_leave_the_same_bytes_as_one_and_a_second_run_nothing(
-    database: Path, tmp_path: Path, run
+    database: Path, tmp_path: Path, profile: str, run
 ) -> None:
-    run(str(database), "-o", str(tmp_path / "one"))
-    run(str(database), "-o", str(tmp_path / "two"), "--jobs", "2", "--quiet")
+    xl.convert_many(database, tmp_path / "one", profile=profile, seed=3, workers=0, time_limit=4.0)
+    run(str(database), "-o", str(tmp_path / "two"), "--jobs", "2", "--quiet", "--time-limit", "4")
     one = tree(tmp_path / "one")
     assert one == tree(tmp_path / "two")
-    code, out, _ = run(str(database), "-o", str(tmp_path / "one"), "--json")
+    code, out, _ = run(str(database), "-o", str(tmp_path / "one"), "--json", "--time-limit", "4")
     *outputs, summary = map(json.loads, out.splitlines())
     assert code == 1
     assert {(row["kind"], row["output"]) for row in outputs} >= {("output", "broken.xosc")}
@@ -106,11 +106,14 @@ def test_two_processes_leave_the_same_bytes_as_one_and_a_second_run_nothing(
     assert tree(tmp_path / "one") == one
 
 
-def test_a_variant_is_what_the_single_conversion_writes(database: Path, tmp_path: Path, run) -> None:
-    run(str(database / "cut-in"), "-o", str(tmp_path / "batch"), "--variants", "2", "--ego", "none")
+def test_a_variant_is_what_the_single_conversion_writes(database: Path, tmp_path: Path, profile: str, run) -> None:
+    options = {"profile": profile, "seed": 3, "ego": "none", "time_limit": 10.0}
+    xl.convert_many(database / "cut-in", tmp_path / "batch", variants=2, workers=0, **options)
     (tmp_path / "single").mkdir()
     source, single_output = database / "cut-in" / "cut-in.xosc", tmp_path / "single" / "cut-in.xosc"
-    code, *_ = run(str(source), "-o", str(single_output), "--variants", "2", "--ego", "none")
+    code, *_ = run(
+        str(source), "-o", str(single_output), "--variants", "2", "--ego", "none", "--time-limit", "10", "--quiet"
+    )
     assert code == 0
     single = {path.name: path.read_bytes() for path in (tmp_path / "single").glob("*.xosc")}
     batch = {path.name: path.read_bytes() for path in (tmp_path / "batch").glob("*.xosc")}

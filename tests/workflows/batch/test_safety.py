@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -19,9 +20,12 @@ import xosc_lateral as xl
 from tests.kit.fake_converter import convert
 from tests.workflows.batch.test_batch import ROOT, make_inputs, run
 from xosc_lateral.base.signals import Interrupted
-from xosc_lateral.files.atomic import files_of_run, replace_atomically
+from xosc_lateral.files.atomic import files_of_run, replace_atomically, write_atomically
+from xosc_lateral.files.source import hash_of
+from xosc_lateral.workflows.batch import jobs
 from xosc_lateral.workflows.batch.batch import STATE_FOLDER, BatchStoppedError, JobState, convert_many
 from xosc_lateral.workflows.batch.jobs import plan_batch
+from xosc_lateral.workflows.conversion import convert as convert_module
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX links and signals")
 
@@ -73,20 +77,29 @@ def test_state_files_that_lead_elsewhere_are_refused(tmp_path: Path, name: str, 
 
 @pytest.mark.parametrize("inner", ["sub", "sub/deep"])
 @pytest.mark.parametrize("root", ["out", "pages"])
-def test_a_link_in_place_of_a_folder_of_outputs_or_pages_is_not_followed(tmp_path: Path, root: str, inner: str) -> None:
+def test_a_link_in_place_of_a_folder_of_outputs_or_pages_is_not_followed(
+    tmp_path: Path, root: str, inner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is converted does not matter here: a text, and its page another one."""
+    text, page = "<!-- xosc-lateral provenance: none -->", '<meta name="generator" content="xosc-lateral 0">'
+    monkeypatch.setattr(convert_module, "convert_scenario", lambda _, path, *__, **___: write_atomically(path, text))
+    monkeypatch.setattr(jobs, "_described", lambda job, _: replace(job.row(), output_sha256=hash_of(text.encode())))
+    monkeypatch.setattr("xosc_lateral.workflows.conversion.page.conversion_page", lambda _: page)
+    monkeypatch.setattr("xosc_lateral.workflows.playing.figures.thumbnail", lambda _: "")
+    monkeypatch.setattr(Path, "movement", None, raising=False)
     victim, place = tmp_path / "victim", tmp_path / root / inner
     for folder in ("in/sub/deep", "in/other"):
         xl.write_template("cut-in", tmp_path / folder)
     victim.mkdir()
     place.parent.mkdir(parents=True)
     place.symlink_to(victim)
-    made = xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", time_limit=1.0)
+    made = xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", workers=0)
     failed, done = made.to_dict()["outputs"][::-1]
     assert (failed["output"], done["error"]) == ("sub/deep/cut-in.xosc", "")
     assert failed["error"] == f"{place}: is a link, which is not followed here: remove it"
     assert not list(victim.iterdir())
     place.unlink()
-    assert not xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", time_limit=1.0).failed
+    assert not xl.convert_many(tmp_path / "in", tmp_path / "out", report=tmp_path / "pages", workers=0).failed
 
 
 def test_a_run_leaves_the_temporary_files_of_others_alone_and_removes_those_of_killed_ones(tmp_path: Path) -> None:
@@ -138,11 +151,13 @@ def _answer_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_is_one_line_with_the_number_of_finished_outputs(tmp_path: Path, number: signal.Signals) -> None:
+@pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, 2), (signal.SIGTERM, 1), (signal.SIGHUP, 1)])
+def test_a_signal_is_one_line_with_the_number_of_finished_outputs(
+    tmp_path: Path, number: signal.Signals, workers: int
+) -> None:
     inputs = make_inputs(tmp_path / "in", 8, **{f"slow{index}": "slow" for index in range(80)})
     out = tmp_path / "out"
-    words = ["convert", str(inputs), "-o", str(out), "--jobs", "2", "-q"]
+    words = ["convert", str(inputs), "-o", str(out), "--jobs", str(workers), "-q"]
     command = [sys.executable, "-c", STOPPED_RUN, *words]
     with subprocess.Popen(
         command,

@@ -52,10 +52,12 @@ def scenario(
     return write_scenario(folder, text)
 
 
-def test_a_car_with_acc_keeps_it_and_moves_in_its_lane_and_who_depends_on_it_stays_reactive(tmp_path: Path) -> None:
+def test_a_car_with_acc_keeps_it_and_its_place_in_the_lane_and_who_depends_on_it_stays_reactive(tmp_path: Path) -> None:
+    """A path beside what moves the car along would put it a frame ahead."""
     path = scenario(tmp_path, object_controller("ACCController"), LONGITUDINAL)
     made = xl.convert(path, tmp_path / "out.xosc", seed=2)
-    assert made.modes == {"Ego": "lane-offset", "A": "lane-offset", "B": "trajectory"}
+    assert made.modes == {"A": "lane-offset", "B": "trajectory"}
+    assert "Ego: as in the scenario (driven by controller 'ACCController': along the road)" in str(made)
     assert made.ego == () and not made.is_replay and made.warnings == ()
     assert "'Ego' is left to controller 'ACCController': along the road" in str(made)
     said = made.to_dict()["controllers"]
@@ -69,7 +71,7 @@ def test_a_car_that_a_controller_steers_stays_as_it_is(tmp_path: Path, name: str
     flags = LONGITUDINAL if name == "NaturalDriver" else BOTH
     made = xl.convert(scenario(tmp_path, object_controller(name), flags), tmp_path / "out.xosc", seed=2)
     assert made.modes == {"A": "lane-offset", "B": "trajectory"}
-    assert "Ego: as in the scenario (steered by its controller)" in str(made)
+    assert f"Ego: as in the scenario (driven by controller '{name}': along and across the road)" in str(made)
 
 
 def test_before_a_controller_steers_and_after_it_the_car_moves_as_any_other(tmp_path: Path) -> None:
@@ -127,7 +129,6 @@ def test_in_esmini_a_car_with_acc_drives_as_in_the_source_and_live_leaves_it_alo
         frame = live_esmini(file, os.environ["ESMINI_LIBRARY"], ego=["Ego", "A", "B"], duration=11.0).to_frame()
         runs.append(frame[frame.name == "Ego"])
     assert np.ptp(runs[0].speed) > 3.0  # it follows A, which the default driver would not
-    assert np.abs(runs[0].s.to_numpy() - runs[1].s.to_numpy()).max() < 0.2
-    assert np.ptp(runs[1].offset) > 0.005
+    assert np.abs(runs[0].s.to_numpy() - runs[1].s.to_numpy()).max() < 0.02
     alone = live_esmini(path, os.environ["ESMINI_LIBRARY"], duration=5.0).to_frame()
     assert set(alone[alone.steered].name) == {"A", "B"}

@@ -85,15 +85,15 @@ def test_whoever_follows_a_trajectory_moves_in_a_lane_change_as_if_there_were_no
     assert np.ptp(deviations[0][400:600]) > 0.02
 
 
-@pytest.mark.parametrize("what", ["placed anew", "slow"])
+@pytest.mark.parametrize("what", ["placed anew", "backwards"])
 def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what: str) -> None:
     network = two_roads(tmp_path)
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
     activity[400:600] |= int(Activity.LATERAL)
     motion = drive(network, entity(), duration=20.0, activity=activity)
-    if what == "slow":
+    if what == "backwards":
         at = np.arange(1001)
-        motion = motion.having(speed=np.where((at >= 480) & (at < 520), 5.0, motion.speed))
+        motion = motion.having(speed=np.where((at >= 480) & (at < 520), -5.0, motion.speed))
     else:
         activity[500] |= int(Activity.TELEPORTED)
     motion = motion.having(activity=activity)
@@ -103,7 +103,7 @@ def test_movement_does_not_go_on_through_what_is_no_driving(tmp_path: Path, what
         .deviation
         for names in ((), ("car",))
     ]
-    if what == "slow":
+    if what == "backwards":
         np.testing.assert_array_equal(found[0], found[1])
     else:  # before and after it, it goes on
         assert np.ptp(found[1][401:499]) > 0.005
@@ -204,7 +204,7 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
 
 def test_who_is_not_enriched_keeps_every_bit_and_the_reason_is_given(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
-    slow = drive(network, entity("slow"), speed=8.0)
+    slow = drive(network, entity("slow"), speed=-8.0)
     result = enrich(
         SegmentedRun(together(slow, drive(network, entity("other"))), network),
         {"slow": simulated_profile(), "other": "why not"},

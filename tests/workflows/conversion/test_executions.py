@@ -9,7 +9,7 @@ import pytest
 import xosc_lateral as xl
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.cli import main
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import SPARE_ACTS
+from xosc_lateral.files.openscenario.write.reactive import SPARE_ACTS
 from xosc_lateral.workflows.conversion import convert
 
 

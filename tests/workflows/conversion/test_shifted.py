@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -12,7 +14,7 @@ from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.meaning import keep_meaning
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import Move, OffsetChain, Ring, Size, resized
+from xosc_lateral.world.motion.offset_path import OffsetPath, PathPiece, resized
 
 
 def _compare(before: Played, after_: Played) -> Comparison:
@@ -45,57 +47,71 @@ def test_an_event_that_is_missing_is_named(tmp_path: Path) -> None:
     assert str(change) == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
 
 
-def _chain(entity: str, after: tuple[str, ...] | None) -> OffsetChain:
-    return OffsetChain(entity, after, Ring(0.1, (Move(0.0, 3.0, -0.2), Move(0.0, 3.0, 0.2))))
+def _path(entity: str, after: tuple[str, ...] | None) -> OffsetPath:
+    piece = PathPiece(np.array([0.0, 50.0, 100.0]), np.array([0.0, 0.1, -0.1]))
+    return OffsetPath(entity, after, (piece,))
 
 
 def _nobody() -> NominalMotion:
     return NominalMotion(0.02, (), end_time=20.0, ended_by="stop trigger", notes=())
 
 
-def test_the_smallest_change_that_helps_is_one_chain_of_one_vehicle() -> None:
+def _largest(path: OffsetPath) -> float:
+    return max(float(np.abs(piece.offset).max()) for piece in path.pieces)
+
+
+def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
     """Planted: what A does before its maneuver changes an event if it is larger than a third of what was sampled."""
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
-    chains = [_chain("A", None), _chain("A", ("late",)), _chain("B", None)]
+    paths = [_path("A", None), _path("A", ("late",)), _path("B", None)]
 
-    def attempt(some: list[OffsetChain]) -> tuple[None, list[Comparison]]:
-        large = [one for one in some if one.entity == "A" and one.after is None and one.ring.origin > 0.034]
+    def attempt(some: Sequence[OffsetPath]) -> tuple[None, list[Comparison]]:
+        large = [one for one in some if one.entity == "A" and one.after is None and _largest(one) > 0.034]
         return None, [change if large else Comparison((), ())]
 
-    _, kept = keep_meaning(chains, _nobody(), attempt)
+    _, kept = keep_meaning(paths, _nobody(), attempt)
     assert kept.changes == ()
-    assert [chain.ring.origin for chain in kept.chains] == [pytest.approx(0.025), 0.1, 0.1]
-    assert kept.smaller == {"A": (Size(0.25), False)}
-
-
-def test_a_contact_costs_the_largest_offsets_alone() -> None:
-    """Planted: B is touched where it is farther than 0.16 m from the middle; all else stays as it was sampled."""
-    change = Comparison((), (Change("contact of 'Ego' and 'B' at 8.0 s", "Ego", 8.0, "is new"),))
-    ring = Ring(0.05, (Move(0.0, 3.0, -0.1), Move(0.0, 4.0, 0.25), Move(0.0, 3.0, -0.15)))
-    chains = [_chain("A", None), OffsetChain("B", None, ring)]
-
-    def attempt(some: list[OffsetChain]) -> tuple[None, list[Comparison]]:
-        ring = next(chain.ring for chain in some if chain.entity == "B")
-        place = ring.origin + sum(move.change for move in ring.moves[:2])
-        return None, [change if place > 0.16 else Comparison((), ())]
-
-    _, kept = keep_meaning(chains, _nobody(), attempt)
-    assert kept.chains[0] == chains[0] and kept.smaller == {"B": (Size(limit=0.75), True)}
-    assert [move.change for move in kept.chains[1].ring.moves] == pytest.approx([-0.1, 0.2, -0.1])
-    assert "lane offsets of 'B' are at most 0.75 times the largest that was sampled" in next(kept.warnings(()))
+    assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
+    assert kept.smaller == {"A": (0.25, False)}
+    assert "lane offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(()))
 
 
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
-    chains = [_chain("A", None), _chain("B", None)]
-    _, kept = keep_meaning(chains, _nobody(), lambda _: (None, [change]))
-    assert kept.chains == tuple(chains) and kept.smaller == {}
+    paths = [_path("A", None), _path("B", None)]
+    _, kept = keep_meaning(paths, _nobody(), lambda _: (None, [change]))
+    assert kept.paths == tuple(paths) and kept.smaller == {}
     assert kept.changes == change.changes
 
 
-def test_moves_of_another_size_lead_back_to_where_they_began() -> None:
-    chain = replace(_chain("A", None), placed_t=-1.9, side=-1.0)
-    half = resized(chain, Size(0.5))
-    assert [move.change for move in half.ring.moves] == [-0.1, 0.1]
+def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
+    """Whoever contradicts each trial sees all of them: none is larger than what was sampled, nor on the other side."""
+    places = np.random.default_rng(3).uniform(-0.4, 0.4, (2, 6)).round(3)
+    paths = [
+        OffsetPath(
+            entity, None, (PathPiece(20.0 * np.arange(6.0), row),), placed_t=float(row[0]) - 1.75, start=float(row[0])
+        )
+        for entity, row in zip("AB", places, strict=True)
+    ]
+    tried: list[OffsetPath] = []
+
+    def attempt(some: list[OffsetPath]) -> tuple[None, list[Comparison]]:
+        tried.extend(some)
+        change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
+        return None, [Comparison((), (change,) if len(tried) < 60 else ())]
+
+    keep_meaning(paths, _nobody(), attempt)
+    assert len({path.start for path in tried}) > 4
+    for path in tried:
+        sampled = places["AB".index(path.entity)]
+        for piece in path.pieces:
+            assert (np.abs(piece.offset) <= np.abs(sampled) + 1e-6).all() and (piece.offset * sampled >= 0.0).all()
+        assert path.placed_t + 1.75 == pytest.approx(path.start), "it begins where its path does"
+
+
+def test_a_path_of_another_size_begins_nearer_to_the_middle() -> None:
+    path = replace(_path("A", None), placed_t=-1.9, side=-1.0, start=0.1)
+    half = resized(path, 0.5)
+    assert half.pieces[0].offset.tolist() == [0.0, 0.05, -0.05]
     assert half.placed_t == pytest.approx(-1.85)
-    assert resized(chain, Size(0.0)).ring.moves == ()
+    assert resized(path, 0.0).pieces == ()

@@ -28,7 +28,7 @@ def test_each_reason_is_named_and_no_row_is_lost(tmp_path: Path) -> None:
     activity[200:220] |= int(Activity.TRAJECTORY)
     activity[490:] = 0
     speed = np.full(501, 30.0)
-    speed[300:350] = 10.0
+    speed[300:350] = -1.0
     spans = cut_segments(drive(network, entity(), activity=activity, speed=speed), network)
     assert [span.kind for span in spans] == [
         SegmentKind.ROAD_FOLLOWING,
@@ -36,7 +36,7 @@ def test_each_reason_is_named_and_no_row_is_lost(tmp_path: Path) -> None:
         SegmentKind.ROAD_FOLLOWING,
         SegmentKind.TRAJECTORY,
         SegmentKind.ROAD_FOLLOWING,
-        SegmentKind.SLOW,
+        SegmentKind.BACKWARDS,
         SegmentKind.ROAD_FOLLOWING,
         SegmentKind.ABSENT,
     ]
@@ -45,10 +45,10 @@ def test_each_reason_is_named_and_no_row_is_lost(tmp_path: Path) -> None:
     assert all(a.last + 1 == b.first for a, b in pairwise(spans))
 
 
-def test_exactly_40_km_h_counts_as_road_following_and_a_hair_less_does_not(tmp_path: Path) -> None:
+def test_who_drives_slowly_or_stands_follows_the_road(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
-    assert cut_segments(drive(network, entity(), speed=40 / 3.6), network)[0].is_road_following
-    assert cut_segments(drive(network, entity(), speed=11.1), network)[0].kind is SegmentKind.SLOW
+    for speed in (0.0, 3.0, 11.1):
+        assert cut_segments(drive(network, entity(), speed=speed), network)[0].is_road_following
 
 
 def test_a_teleport_cuts_and_only_who_drives_across_the_lane_follows_none(tmp_path: Path) -> None:

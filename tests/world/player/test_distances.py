@@ -20,6 +20,8 @@ from xosc_lateral.world.player.distances import (
     straight_distance,
 )
 from xosc_lateral.world.player.drive import align_trailers, connect, disconnect, pull_trailers
+from xosc_lateral.world.player.paths.base import Path as Curve
+from xosc_lateral.world.player.paths.base import PathPoint, PathProgress
 from xosc_lateral.world.player.state import EntityState, free
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
@@ -95,6 +97,37 @@ def test_aside_is_to_the_left_in_the_entity_s_frame_and_along_t_on_the_road(worl
     assert distance(world, own, other, ENTITY, ASIDE) == pytest.approx(-3.5)  # to its right
     assert distance(world, own, other, ROAD, ASIDE) == pytest.approx(3.5)
     assert distance(world, own, other, WORLD, ASIDE) == pytest.approx(3.5)
+
+
+@dataclass
+class Circle(Curve):
+    """About the origin, to the left, from (radius, 0) on."""
+
+    radius: float
+
+    def __post_init__(self) -> None:
+        super().__init__((0.0, 1.5 * pi * self.radius), (0.0, 1.0))
+
+    def at(self, s: float) -> PathPoint:
+        angle = s / self.radius
+        return PathPoint(self.radius * cos(angle), self.radius * sin(angle), 0.0, 0.0, 0.0, 0.0, angle + pi / 2.0)
+
+
+@pytest.mark.parametrize("radius", [20.0, 60.0])
+@pytest.mark.parametrize(("angle", "inwards"), [(0.3, 2.0), (2.0, -3.0), (4.0, 0.0)])
+def test_along_a_trajectory_ahead_is_its_length_and_aside_is_square_to_it(
+    world: World, radius: float, angle: float, inwards: float
+) -> None:
+    """On a circle to the left, inside is left: what lies so far from its middle is so far aside, wherever it is."""
+    own, other = world.put(0, -1, 100.0), world.cars[1]
+    own.path = PathProgress(Circle(radius), 0.5 * radius)
+    other.put_in_world(free((radius - inwards) * cos(angle), (radius - inwards) * sin(angle), 0.0))
+    along, aside = (distance(world, own, other, CoordinateSystem.TRAJECTORY, kind) for kind in (AHEAD, ASIDE))
+    assert along == pytest.approx((angle - 0.5) * radius, abs=1e-4)
+    assert aside == pytest.approx(inwards, abs=1e-4)
+    own.path = None
+    straight = distance(world, own, other, CoordinateSystem.TRAJECTORY, ASIDE)
+    assert abs(straight) == pytest.approx(hypot(own.plane.x - other.plane.x, own.plane.y - other.plane.y))
 
 
 # ---- along the road --------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import pytest
 
 from tests.kit.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.files.opendrive.reader import read_opendrive
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.world.road.piecewise import PiecewiseCubic
 from xosc_lateral.world.road.surface import Surface
 
@@ -255,6 +255,40 @@ def test_a_lean_on_a_grade_leads_along_s_and_finds_back():
     assert t * shrink == pytest.approx(t * cos(lean))
     assert height == pytest.approx(10.0 * grade + t * cos(pitch) * sin(lean))
     assert surface.lead_at(10.0, t * shrink) == pytest.approx(lead)
+
+
+ROUGH = """<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="200" junction="-1">
+<planView><geometry s="0" x="3" y="-2" hdg="0" length="200"><line/></geometry></planView>
+<elevationProfile><elevation s="0" a="4" b="-0.06" c="2e-3" d="2e-6"/></elevationProfile>
+<lateralProfile><superelevation s="0" a="-0.1" b="2e-3" c="-3e-6" d="0"/></lateralProfile>
+<lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
+<right><lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-2" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>
+</laneSection></lanes></road></OpenDRIVE>"""
+
+
+def _in_space(s: float, t: float) -> np.ndarray:
+    """The leaning line is turned about the climbing one: along that (1, 0, grade), across it (-grade, 0, 1)."""
+    height, grade = 4 - 0.06 * s + 2e-3 * s**2 + 2e-6 * s**3, -0.06 + 4e-3 * s + 6e-6 * s**2
+    lean, size = -0.1 + 2e-3 * s - 3e-6 * s**2, np.hypot(1.0, grade)
+    upwards = np.array([-grade, 0.0, 1.0]) / size
+    return np.array([3.0 + s, -2.0, height]) + t * (cos(lean) * np.array([0.0, 1.0, 0.0]) + sin(lean) * upwards)
+
+
+@pytest.mark.parametrize("s", [0.7, 35.0, 50.0, 120.0, 199.0])
+@pytest.mark.parametrize("offset", [-1.2, 0.0, 0.9])
+@pytest.mark.parametrize("lane", [-1, -2])
+def test_a_place_on_a_banked_climbing_road_is_where_geometry_says_and_is_found_again(s, offset, lane):
+    """Grade and bank change along the road, and the bank turns from one side to the other on it."""
+    network, t = parse_opendrive(ROUGH.encode(), "rough.xodr"), 3.5 * (lane + 0.5) + offset
+    pose = network.pose_at(0, lane, s, offset)
+    np.testing.assert_allclose((pose.x, pose.y, pose.z), _in_space(s, t), atol=1e-9)
+    track = (_in_space(s + 1e-4, t) - _in_space(s - 1e-4, t)) / 2e-4
+    forward = cos(pose.pitch) * cos(pose.heading), cos(pose.pitch) * sin(pose.heading), -sin(pose.pitch)
+    np.testing.assert_allclose(forward, track / np.linalg.norm(track), atol=1e-6)
+    for near in (None, (0, s + 4.0)):
+        place = network.world_to_lane_at(pose.x, pose.y, near=near)
+        assert (place.lane, place.s, place.t) == (lane, pytest.approx(s, abs=1e-4), pytest.approx(t, abs=1e-4))
 
 
 @pytest.mark.parametrize("name", ["straight", "arcs", "cubics"])

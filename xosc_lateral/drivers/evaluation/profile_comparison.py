@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation import sizes
-from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of, highway_drives
+from xosc_lateral.drivers.evaluation.lane_keeping import (
+    HIGHWAY_SPEED,
+    LaneKeeping,
+    MovementSummary,
+    figures_of,
+    highway_drives,
+)
 from xosc_lateral.drivers.evaluation.metrics import (
     DRIVER_COUNT,
     METRICS,
@@ -36,8 +43,6 @@ class ComparedProfile:
     runs: FloatArray  # Shape (drivers, n). [m]
     summary: MovementSummary
     keeping: LaneKeeping
-    measured: sizes.Sizes | None  # Of the drives that it was fitted on, where it knows them.
-    sampled: sizes.Sizes  # Of its own drives, as sure as if it had been fitted on such.
     spectrum: Spectrum
 
 
@@ -51,6 +56,8 @@ class Compared:
     # drivers at most, where the mean over the metrics is the 95 % quantile of random choices.
     metrics: FloatArray
     scale: FloatArray  # Those standard deviations, shape (10,). [m]
+    # What each pair differs by at one speed: of the drives that both were fitted on, else of drives sampled from both.
+    differences: Mapping[tuple[str, str], list[sizes.Difference]]
     seed: int
 
     @property
@@ -70,17 +77,6 @@ class Compared:
         return np.sqrt(0.5 * (itself[:, None] ** 2 + itself[None, :] ** 2))
 
     @property
-    def differences(self) -> dict[tuple[str, str], list[sizes.Difference]]:
-        """What each pair differs by, of the drives that both were fitted on, else of drives sampled from both."""
-        pairs = {}
-        for first, second in combinations(self.profiles, 2):
-            both = first.sampled, second.sampled
-            if first.measured is not None and second.measured is not None:
-                both = first.measured, second.measured
-            pairs[first.profile.name, second.profile.name] = sizes.differences(*both)
-        return pairs
-
-    @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """Profiles that are alike, each with each (complete linkage): they differ no more than two fits of a driver."""
         from scipy.cluster.hierarchy import fcluster, linkage
@@ -95,13 +91,50 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
     compared = []
     for number, profile in enumerate(profiles):
-        runs, drives, step = free_runs(profile, seed + number), highway_drives(profile, seed), profile.model.step
-        known = profile.provenance.fit
-        measured = None if "derived_from" in known else sizes.Sizes.from_dict(known.get("sizes", {}))
-        sampled = sizes.sizes_of_samples(drives, step, *_fitted_drives(profile))
-        figures = figures_of(profile, seed, drives)
-        compared.append(ComparedProfile(profile, runs, *figures, measured, sampled, spectrum(list(runs), step)))
-    return Compared(tuple(compared), *_distances(compared, seed), seed)
+        runs = free_runs(profile, seed + number)
+        figures = figures_of(profile, seed, highway_drives(profile, seed))
+        compared.append(ComparedProfile(profile, runs, *figures, spectrum(list(runs), profile.model.step)))
+    distances = _distances(compared, seed)
+    return Compared(tuple(compared), *distances, _differences(profiles, seed), seed)
+
+
+def _differences(profiles: Sequence[DriverProfile], seed: int) -> dict[tuple[str, str], list[sizes.Difference]]:
+    measured = {each.name: _measured(each) for each in profiles}
+    free = {each.name: _sampled(replace(each, effects=()), seed) for each in profiles}
+    pairs = {}
+    for first, second in combinations(profiles, 2):
+        speed, both, pair = common_speed(first, second), list[sizes.Sizes](), (first.name, second.name)
+        for each in (first, second):
+            of_drives, sampled = measured[each.name], _sampled(each, seed, speed) if each.effects else free[each.name]
+            if of_drives is not None and all(measured[name] is not None for name in pair):
+                # The drives are known as they are without any effect; by how much effects change them, by sampling.
+                sampled = sizes.Sizes(of_drives.values + sampled.values - free[each.name].values, of_drives.errors)
+            both.append(sampled)
+        pairs[pair] = sizes.differences(*both)
+    return pairs
+
+
+def common_speed(first: DriverProfile, second: DriverProfile) -> float:
+    """In the middle of the speeds that both have been driven at, or between these where none is shared. [m/s]
+
+    That of the one whose speeds are known, else of the highway driving test.
+    """
+    known = [each.validity.speed for each in (first, second) if each.validity.speed is not None]
+    if not known:
+        return HIGHWAY_SPEED
+    return 0.5 * (max(low for low, _ in known) + min(high for _, high in known))
+
+
+def _measured(profile: DriverProfile) -> sizes.Sizes | None:
+    """Of the drives that it was fitted on, where it knows them."""
+    known = profile.provenance.fit
+    return None if "derived_from" in known else sizes.Sizes.from_dict(known.get("sizes", {}))
+
+
+def _sampled(profile: DriverProfile, seed: int, speed: float = HIGHWAY_SPEED) -> sizes.Sizes:
+    """Of its own drives at a speed [m/s], as sure as if it had been fitted on such."""
+    drives = highway_drives(profile, seed, speed=speed)
+    return sizes.sizes_of_samples(drives, profile.model.step, *_fitted_drives(profile))
 
 
 def _distances(profiles: Sequence[ComparedProfile], seed: int) -> tuple[FloatArray, FloatArray]:

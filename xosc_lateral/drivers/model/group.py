@@ -75,8 +75,11 @@ class ResponseStream:
         if not there.any():  # who comes next meets nobody's past
             self.restore(ResponseStreamState(ResponseState()))
 
-    def see(self, context: Mapping[str, FloatArray], *, before: bool = False) -> None:
-        """One more row of context, shape (n,) each; what responds to a row before the drive is not given."""
+    def see(self, context: Mapping[str, FloatArray], *, before: bool = False, whose: BoolArray | None = None) -> None:
+        """One more row of context, shape (n,) each; what responds to a row before the drive is not given.
+
+        Others than those `whose` row it is, shape (n,), are left where they are; what `next` gives of them is void.
+        """
         row = self.effect.known(context).ravel()
         state, seen = self.state, self.state.response
         if seen.held is not None and (known := seen.held.shape[1]) < len(row):
@@ -85,7 +88,14 @@ class ResponseStream:
             if seen.settled is not None:
                 lags = seen.settled.reshape(-1, known)
                 seen.settled = np.concatenate([lags, np.tile(new, (len(lags), 1))], axis=1).ravel()
+        held, settled = seen.held, seen.settled
         state.ready.extend(self._response.take(row[None, :]))
+        if whose is not None and not whose.all() and held is not None and seen.held is not None:
+            waits = np.repeat(~whose, self._slopes.shape[1])
+            rows = np.maximum(np.arange(len(held) - len(seen.held), len(held)), 0)
+            seen.held = np.where(waits, held[rows], seen.held)
+            if settled is not None and seen.settled is not None:
+                seen.settled = np.where(np.tile(waits, len(settled) // len(waits)), settled, seen.settled)
         if state.drop or before:
             state.drop += before
             dropped = min(state.drop, len(state.ready))
@@ -146,7 +156,7 @@ class OffsetGroup:
         example.begin_at(0.0)
         self._hidden = [part is not None for part in example.hidden_terms_at(np.zeros(1, dtype=np.int64)).parts]
         self._drives: list[DriveProcess] = []
-        self._delay, self._widths = delay, list[FloatArray]()  # lane widths that are not yet responded to [m]
+        self._widths = np.zeros((delay + 1, 0))  # of the lane, not yet responded to, by driver; 0: none yet [m]
         self._state = np.empty(0, dtype=_DRIVER)
 
     def __len__(self) -> int:
@@ -163,6 +173,7 @@ class OffsetGroup:
         for response in self.responses:
             response.join([drive.columned[response.number].coefficients for drive in new])
         self._state = np.concatenate([self._state, np.zeros(len(new), dtype=_DRIVER)])
+        self._widths = np.concatenate([self._widths, np.zeros((len(self._widths), len(new)))], axis=1)
         self.actuator.join(len(new))
         return new
 
@@ -175,10 +186,12 @@ class OffsetGroup:
             response.keep_present(there)
         self._state = self._state[there]
         self.actuator.keep_present(there)
-        self._widths = [widths[there[: len(widths)]] for widths in self._widths]
+        self._widths = self._widths[:, there]
 
-    def advance(self, context: Mapping[str, FloatArray], width: FloatArray) -> FloatArray:
-        """One model step of everybody.
+    def advance(
+        self, context: Mapping[str, FloatArray], width: FloatArray, whose: BoolArray | None = None
+    ) -> FloatArray:
+        """One model step of everybody, or of those `whose` it is, shape (n,): what is returned of others is void.
 
         Parameters
         ----------
@@ -192,22 +205,27 @@ class OffsetGroup:
         array, shape (n, 6)
             Coefficients in u, from 0 at this moment to 1 at the next, lowest power first, of the offset. [m]
         """
-        self.see(context)
-        known = [np.concatenate([widths, width[len(widths) :]]) for widths in self._widths]  # to who came, as it is now
-        self._widths = [*known, width][-self._delay - 1 :]
-        effects, width = self._effects(), self._widths[0]
-        fresh = np.flatnonzero(self._state["row"] == 0)
+        self.see(context, whose=whose)
+        on = np.arange(len(self)) if whose is None else np.flatnonzero(whose)
+        effects, width = [terms.rows(on) for terms in self._effects()], self._width_heeded(on, width[on])
+        fresh = np.flatnonzero(self._state["row"][on] == 0)
         if len(fresh):
             theirs = [terms.rows(fresh) for terms in effects]
-            first, second = (self._next(fresh, theirs, width[fresh]) for _ in range(2))
-            self.actuator.state["samples"][fresh, 1] = extrapolate(second, first)
-        self._next(np.arange(len(self)), effects, width)
+            first, second = (self._next(on[fresh], theirs, width[fresh]) for _ in range(2))
+            self.actuator.state["samples"][on[fresh], 1] = extrapolate(second, first)
+        self._next(on, effects, width)
         return np.stack(np.broadcast_arrays(*piece(*self.actuator.state["samples"].T)), axis=1)
 
-    def see(self, context: Mapping[str, FloatArray], *, before: bool = False) -> None:
-        """One more row of context, shape (n,) each: of the drive, or from before it."""
+    def _width_heeded(self, drivers: IntArray, width: FloatArray) -> FloatArray:
+        """The lane width that some drivers, who now see this one, respond to: as late as to all else. [m]"""
+        new = self._widths[0, drivers] == 0.0  # to who came, it has always been as it is now
+        self._widths[:, drivers] = np.where(new, width, np.vstack([self._widths[1:, drivers], width]))
+        return np.asarray(self._widths[0, drivers])
+
+    def see(self, context: Mapping[str, FloatArray], *, before: bool = False, whose: BoolArray | None = None) -> None:
+        """One more row of context, shape (n,) each: of the drive, or from before it; of all, or of some drivers."""
         for response in self.responses:
-            response.see(context, before=before)
+            response.see(context, before=before, whose=whose)
 
     def sample(self, width: FloatArray, start: float | None = None) -> FloatArray:
         """Everybody's next sample, once what it depends on was seen, shape (n,); the first may be given. [m]"""
@@ -299,15 +317,15 @@ class OffsetGroup:
     def to_dict(self) -> dict[str, Any]:
         """All that changes while driving, as plain JSON values."""
         responses = [response.state.response for response in self.responses]
-        known = {"drives": self.driver_states(), "columns": self.columns, "widths": self._widths}
+        known = {"drives": self.driver_states(), "columns": self.columns, "widths": list(self._widths)}
         return plain({"responses": responses, **known})  # type: ignore[no-any-return]
 
     def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
         """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
         responses = read_as(list[ResponseState], state["responses"], "responses")
         drivers = read_as(list[DriverState], state["drives"], "drives")
-        self._widths = read_as(list[FloatArray], state["widths"], "widths")
         self.go_on_from(drivers, [ResponseStreamState(response) for response in responses], seeds)
+        self._widths[:] = np.stack(read_as(list[FloatArray], state["widths"], "widths"))
 
     def go_on_from(
         self,

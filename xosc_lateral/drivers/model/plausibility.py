@@ -18,7 +18,7 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, OFFSET_LANES, Range, context_range
-from xosc_lateral.base.segment import Segment
+from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
 from xosc_lateral.drivers.drives.filters import filtered
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 
@@ -136,12 +136,21 @@ def _largest_shift(effect: ColumnEffect, profile: DriverProfile) -> float:
 def _trial_values(effect: ColumnEffect, name: str, profile: DriverProfile) -> FloatArray:
     measured = {"speed": profile.validity.speed, "lane_width": profile.validity.lane_width}
     believed = context_range(name)
-    low, high = measured.get(name) or (believed.low, believed.high)
+    low, high = measured.get(name) or _driven_range(name) or (believed.low, believed.high)
     if high - low <= BELIEVED_SPAN:
         return np.union1d(np.linspace(low, high, 41), np.arange(np.ceil(low), high + 0.5))
     marks = [mark for field in ("levels", "knots", "at", "middle") for mark in np.ravel(getattr(effect, field, ()))]
     size = np.geomspace(1e-6, ENDLESS / 1e3, 40)
     return np.unique([*-size, 0.0, *size, *marks, -ENDLESS, ENDLESS, np.inf])
+
+
+def _driven_range(name: str) -> tuple[float, float] | None:
+    """What a driver meets who keeps a lane, where it is far less than what is believed; None: it is not. [its unit]
+
+    Bends that 40 km/h can be driven in at `ACCELERATION_LIMIT`; 13 lanes of one direction (Katy Freeway, Houston).
+    """
+    bend = ACCELERATION_LIMIT / MINIMUM_SPEED**2
+    return {"curvature": (-bend, bend), "lane_index": (0.0, 12.0), "lane_count": (1.0, 13.0)}.get(name)
 
 
 # ---- what can be driven: bounds on the lateral acceleration and jerk of lane keeping, by speed ----

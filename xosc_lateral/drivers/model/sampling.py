@@ -14,11 +14,12 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.segment import Segment
+from xosc_lateral.base.own_clock import is_slow, ticks_of, within_heading
+from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
 from xosc_lateral.drivers.model.core.base import CoreStream, Start
 from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.drivers.model.effects.base import step_of
-from xosc_lateral.drivers.model.linear_filters import prepare
+from xosc_lateral.drivers.model.linear_filters import extrapolate, piece, prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import read_as
 from xosc_lateral.drivers.model.seeds import DriveSeed, child, generator
@@ -115,8 +116,24 @@ def responses_to(segment: Segment, profile: DriverProfile) -> Responses:
 def sample_offsets(
     profile: DriverProfile, segment: Segment, seed: int | np.random.SeedSequence, *, start: float | None = None
 ) -> FloatArray:
-    """Offsets [m] of one drive of a single segment, shape (n,); see `OffsetSampler.sample`."""
-    return OffsetSampler(profile, seed).sample(segment, start=start)
+    """Offsets [m] of one drive of a single segment, shape (n,); see `OffsetSampler.sample`.
+
+    On the driver's own clock where the segment's speed, if known, is below 40 km/h (`own_clock`).
+    """
+    sampler, inside = OffsetSampler(profile, seed), segment.inside
+    time, speed = segment.time[inside], np.nan_to_num(segment.speed[inside], nan=MINIMUM_SPEED)
+    if len(time) < 2 or not is_slow(speed).any():
+        return sampler.sample(segment, start=start)
+    step = float(time[1] - time[0])
+    own, _, rows = ticks_of(time, speed, step)
+    samples = sampler.sample(segment.at(np.append(rows, rows[-1])), start=start)
+    samples = np.append(extrapolate(samples[1], samples[0]), samples)
+    at = np.minimum(own / step, len(rows) - 1.0)
+    first = np.minimum(at.astype(np.int64), len(rows) - 2)
+    powers = (at - first)[:, None] ** np.arange(6)
+    offset = (np.stack(piece(*(samples[first + k] for k in range(4))), axis=1) * powers).sum(axis=1)
+    way = np.abs(speed)
+    return within_heading(offset, np.append(0.0, np.cumsum(0.5 * (way[1:] + way[:-1]) * np.diff(time))))
 
 
 # ---- the drive that is sampled from ----

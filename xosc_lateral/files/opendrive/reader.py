@@ -99,6 +99,7 @@ def _read_road(
         directions=directions,
         predecessor=_read_link(element, "predecessor"),
         successor=_read_link(element, "successor"),
+        is_motorway=element.find("type[@type='motorway']") is not None,
     )
 
 

@@ -753,29 +753,64 @@ static double settle(DRIVER_state *driver, double passed) {
         + driver->from_rate * (1.0 - 18.0 * u * u + 32.0 * pow(u, 3.0) - 15.0 * pow(u, 4.0));
 }
 
-static void move(DRIVER_state *driver, double u, double passed, const DRIVER_inputs *in, DRIVER_outputs *out) {
+/* Distance driven in a second of the driver's clock. */
+static double way_of(double speed) {
+    return fmax(fabs(speed), (fabs(speed) + HALF_RATE_SPEED) / (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED));
+}
+
+static int is_slow(double speed) {
+    return fabs(speed) < MINIMUM_SPEED * (1.0 - SPEED_SLACK);
+}
+
+/* Seconds of the driver's clock in one: below 40 km/h fewer, and none at rest. */
+static double pace_of(double speed, double own_rate) {
+    const double pace = fabs(speed), rate = pace * (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED) / (pace + HALF_RATE_SPEED);
+    const double turning = LARGEST_SINE * pace / fmax(fabs(own_rate), NEGLIGIBLE_REST);
+    return is_slow(speed) ? fmin(fmin(rate, 1.0), turning) : 1.0;
+}
+
+/* On to the next curve, at the end of one, where it is known. */
+static void turn_over(DRIVER_state *driver) {
+    if (is_set(driver->ahead) && driver->clock >= 1.0 - CLOCK_TOLERANCE) {
+        memcpy(driver->curve, driver->next, sizeof driver->curve);
+        driver->ahead = 0.0;
+        driver->clock = fmax(driver->clock - 1.0, 0.0);
+    }
+}
+
+/* Curves for all until the next model step, `u` into this one. */
+static void draw_ahead(DRIVER_state *driver, double u, const double *columns) {
+    double now[6];
+    turn_over(driver);
+    while (!is_set(driver->ahead) && driver->clock > u + CLOCK_TOLERANCE) {
+        memcpy(now, driver->curve, sizeof now);
+        take_row(driver, columns);
+        memcpy(driver->next, driver->curve, sizeof now);
+        memcpy(driver->curve, now, sizeof now);
+        driver->ahead = 1.0;
+        turn_over(driver);
+    }
+}
+
+static void move(DRIVER_state *driver, double passed, const DRIVER_inputs *in, DRIVER_outputs *out) {
     const double *const c = driver->curve;
+    const double u = fmin(fmax(driver->clock, 0.0), 1.0);
     const double own = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))));
     const double slope = c[1] + u * (2.0 * c[2] + u * (3.0 * c[3] + u * (4.0 * c[4] + u * 5.0 * c[5])));
     const int follows = is_set(in->following), followed = is_set(driver->was_following);
-    double pace = fabs(in->speed) / MINIMUM_SPEED, rate, rest_rate;
-    pace = pace > 1.0 - 1e-6 ? 1.0 : pace * pace * (3.0 - 2.0 * pace);
-    rate = slope / DRIVER_STEP * pace;
+    const double pace = pace_of(in->speed, driver->own_rate), rate = slope / DRIVER_STEP * pace;
+    double own_rate, most;
     if (follows && !followed && driver->stepped != 0) {
         lead_over(driver, driver->place - own + rate * passed, -rate, in->speed);
     }
-    driver->slip = follows && followed ? driver->slip - (1.0 - pace) * (own - driver->own) : 0.0;
-    if (follows && driver->over <= 0.0 && fabs(driver->slip) > NEGLIGIBLE_REST) {
-        lead_over(driver, driver->slip, 0.0, in->speed);
-        driver->slip = 0.0;
-    }
-    rest_rate = settle(driver, passed * pace) * pace;
-    out->offset = follows ? own + driver->rest + driver->slip : in->position;
-    out->rate = follows ? rate + rest_rate : 0.0;
-    out->heading = follows && fabs(in->speed) > STANDSTILL ? asin(fmin(fmax(out->rate / in->speed, -1.0), 1.0)) : 0.0;
+    own_rate = slope / DRIVER_STEP + settle(driver, passed * pace);
+    out->offset = follows ? own + driver->rest : in->position;
+    out->rate = follows ? own_rate * pace_of(in->speed, own_rate) : 0.0;
+    most = is_slow(in->speed) ? LARGEST_SINE : 1.0;
+    out->heading = follows ? asin(fmin(fmax(own_rate / way_of(in->speed), -most), most)) : 0.0;
+    driver->own_rate = follows ? own_rate : 0.0;
     driver->was_following = follows ? 1.0 : 0.0;
     driver->place = out->offset;
-    driver->own = own;
 }
 
 /* ---- what others call ------------------------------------------------------------------------------------------- */
@@ -853,7 +888,7 @@ DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs) {
 }
 
 DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs *inputs, DRIVER_outputs *outputs) {
-    double columns[COLUMNS], passed;
+    double columns[COLUMNS], passed, u;
     int64_t due;
     unsigned fault = driver->profile == PROFILE ? fault_of(inputs, columns) : (unsigned)FAULT_START;
     if (fault == 0U && driver->looked != 0 && driver->looked != DRIVER_LOOKS) {
@@ -871,12 +906,18 @@ DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs
         driver->looked++;
         take_row(driver, columns);
     }
-    while (driver->knots < due) {
-        driver->knots++;
-        take_row(driver, columns);
-    }
     passed = driver->stepped != 0 ? passed : 0.0;
-    move(driver, fmin(fmax((time - driver->begun_at) / DRIVER_STEP - (double)(due - 1), 0.0), 1.0), passed, inputs, outputs);
+    u = (time - driver->begun_at) / DRIVER_STEP - (double)(due - 1);
+    driver->clock += passed * pace_of(inputs->speed, driver->own_rate) / DRIVER_STEP;
+    if (driver->stepped == 0) { /* as if it had driven since its start */
+        driver->clock = (double)due + u;
+    }
+    if (driver->knots < due) {
+        driver->knots = due;
+        draw_ahead(driver, u, columns);
+    }
+    turn_over(driver);
+    move(driver, passed, inputs, outputs);
     driver->time = time;
     driver->stepped = 1;
     return refused(driver, 0U);

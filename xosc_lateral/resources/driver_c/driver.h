@@ -85,8 +85,8 @@ typedef struct {
     double steps[DRIVER_STEPS], block[DRIVER_EVERY], noise[DRIVER_TAPS], window[4];
     DRIVER_hidden_state hidden[DRIVER_HIDDEN];
     double coefficients[DRIVER_COMPONENTS], history[DRIVER_ROWS][DRIVER_COMPONENTS + 1], settled[DRIVER_LAGS];
-    double samples[4], curve[6];
-    double was_following, place, own, rest, from, from_rate, share, over, slip, heeded[5], owed, pace;
+    double samples[4], curve[6], next[6];
+    double was_following, place, clock, ahead, own_rate, rest, from, from_rate, share, over, heeded[5], owed, pace;
 } DRIVER_state;
 
 /* A lane of the profile's own width, at 30 m/s, and nobody around. */

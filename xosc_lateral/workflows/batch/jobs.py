@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,15 +18,15 @@ from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import make_own_folder, together, write_atomically
 from xosc_lateral.files.openscenario.references import require_folders
-from xosc_lateral.files.output_paths import real_path
+from xosc_lateral.files.output_paths import numbered, real_path
 from xosc_lateral.files.profiles import find_profile, profile_hash
 from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.manifest import ManifestRow, printable
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, concrete, document_kind, find_requests
-from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.convert import convert_scenario, numbered
-from xosc_lateral.workflows.conversion.plan import hidden_by_libraries
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
+
+if TYPE_CHECKING:
+    from xosc_lateral.workflows.conversion.conversion import Conversion
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +144,11 @@ def plan_batch(
         pages = _normal(Path(report))
         planned = [replace(job, page=(pages / job.name).with_suffix(".html")) for job in planned]
     libraries = dict.fromkeys(request.settings.library for request in requests if request.settings.uses_auto)
-    notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
+    notes = dict[str, None]()
+    if libraries:
+        from xosc_lateral.workflows.conversion.plan import hidden_by_libraries
+
+        notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
     return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
 
 
@@ -246,6 +251,8 @@ MISSING_HASH = "missing"
 
 def convert_job(job: Job) -> ManifestRow:
     """Convert and describe; `XoscLateralError`: the input is at fault, `OSError`: the output can't be written."""
+    from xosc_lateral.workflows.conversion.convert import convert_scenario  # what has nothing to do needs none of it
+
     _refuse_changes(job)
     for path in filter(None, (job.output, job.page)):
         make_own_folder(path.parent, depth=job.name.count("/"))

@@ -11,31 +11,32 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
+from msgspec import structs
+
 from xosc_lateral.base.errors import DriverProfileError, FormatError
+from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
+from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.source import guarding_inputs
+from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
 from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning
 from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers, other_egos
 from xosc_lateral.workflows.conversion.prepared import prepare
-from xosc_lateral.workflows.conversion.result import Enriched, LaneChanges
+from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain
+from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.scenario import Scenario
 
 SCENARIO_SUFFIXES = (".xosc",)
-SUPPLY_TIME = 60.0
-"""Movement sampled for each segment of a reactive output, at least; a run in which the segment lasts longer repeats it.
-Some of a driver's slow movement is seen in that time. [s]"""
 
 
 @spelled_out(ConvertSettings)
@@ -108,6 +109,9 @@ def convert_scenario(
     written; nothing is left half-written.
     """
     with guarding_inputs():
+        for named in (settings.profile, *settings.entity.values(), settings.context, settings.road):
+            if isinstance(named, str | Path):  # though nobody may be driven by it
+                guard_input(Path(named))
         prepared = prepare(source, settings)
         plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
         return carry_out(plan)
@@ -123,6 +127,17 @@ def carry_out(plan: Plan) -> Conversion:
     return _conversion(plan, checked)
 
 
+CORRIDOR_NOTE = "jam corridor: assumed; no recording that we have shows how far drivers keep aside"
+
+
+def with_corridor(drivers: Drivers) -> dict[str, DriverProfile | str]:
+    """The same drivers, who leave a corridor in a jam on a motorway."""
+    return {
+        name: one if isinstance(one, str) else structs.replace(one, effects=(*one.effects, JamCorridor()))
+        for name, one in drivers.items()
+    }
+
+
 def sample(plan: Plan) -> Enriched:
     """Offsets of every vehicle that has a driver, for as long as the output may run."""
     settings, played = plan.settings, plan.played
@@ -136,7 +151,7 @@ def sample(plan: Plan) -> Enriched:
         )
         return enrich(
             run,
-            plan.drivers,
+            with_corridor(plan.drivers) if settings.jam_corridor else plan.drivers,
             seed=settings.seed,
             variant=plan.variant_index,
             seed_words=seed_words_of(played.motion, played.network),
@@ -144,7 +159,7 @@ def sample(plan: Plan) -> Enriched:
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
             lane_changes=settings.lane_changes,
-            least_time=0.0 if plan.is_replay else SUPPLY_TIME,
+            least_time=0.0 if plan.is_replay else plan.prepared.meaning(tuple(plan.egos)).longest,
         )
     except DriverProfileError as error:  # sampling does not know the file
         raise DriverProfileError(f"{plan.source}: {error}") from error
@@ -162,16 +177,18 @@ def check(plan: Plan, written: Written) -> Written:
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
-    def attempt(chains: Sequence[OffsetChain]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    def attempt(paths: Sequence[OffsetPath]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
-        if chains is not written.chains:  # those of the first trial are written already
-            trial = write_with(chains, plan, written.movement, written.vehicles, written.provenance)
+        if paths is not written.paths:  # those of the first trial are written already
+            trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already.
         output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = source_meaning.compare(output, written.vehicles.trajectories)
+        comparisons, run = source_meaning.compare(
+            output, written.vehicles.trajectories, {path.entity for path in paths}
+        )
         return (trial, output, run), comparisons
 
-    (best, output, run), kept = keep_meaning(written.chains, plan.played.motion, attempt)
+    (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
     return replace(best, movement=movement, shifts=kept.shifts, warnings=tuple(kept.warnings(unmoved)))
@@ -193,6 +210,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *written.warnings,
         *(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
         *validity_warnings(movement),
+        *((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )
     return Conversion(
         source=plan.source,
@@ -221,11 +239,3 @@ def output_scenario(output: PathLike, source: Path) -> Path:
 def default_output(source: Path) -> Path:
     """Where a converted scenario goes unless told otherwise: beside its source."""
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-
-
-def numbered(path: Path, variant_index: int, variants: int) -> Path:
-    """Path of one variant: as it is when there is one alone, else with its number, from 1, before the suffix."""
-    if variants == 1:
-        return path
-    digits = max(2, len(str(variants)))
-    return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")

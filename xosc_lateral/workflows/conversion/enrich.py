@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.own_clock import within_heading
 from xosc_lateral.base.rows import BLOCK, blocks, columns
 from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -125,7 +126,8 @@ class _Sample(NamedTuple):
     """Offsets sampled on one run of spans."""
 
     spans: tuple[SegmentSpan, ...]
-    knots: IntArray  # rows of the motion that were sampled
+    knots: IntArray  # rows of the motion that were sampled, and the distance driven there [m]
+    distance: FloatArray
     offset: FloatArray  # there [m]
     error: FloatArray  # what a sensor adds; zeros unless asked for [m]
     beyond: FloatArray  # how it would go on after the end [m]
@@ -149,7 +151,11 @@ class _Drawn:
         distance, reach = distance_driven(self.motion), SETTLING_TIME * self.motion.speed
         through = deviation_through(
             [
-                SampledDeviation(distance[one.knots], one.offset, (reach[one.knots[0]], reach[one.knots[-1]]))
+                SampledDeviation(
+                    one.distance,
+                    within_heading(one.offset, one.distance),
+                    (reach[one.knots[0]], reach[one.knots[-1]]),
+                )
                 for one in self.samples
             ]
         )
@@ -241,14 +247,14 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         return replace(blank, why="steered by its controller" if steered else "no road-following segment")
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     samples: list[_Sample] = []
-    for spans, knots, segment, side, responses in blank.seen.segments:
+    for spans, knots, distance, segment, side, responses in blank.seen.segments:
         offset = side * sampler.sample(segment, responses=responses)
         more = least - len(knots)
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         subject = f"profile {driver.name} for {blank.motion.name!r}"
         check_offsets(offset, segment.lane_width[segment.inside], subject, segment.time[segment.inside])
         error = sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples))
-        samples.append(_Sample(spans, knots, offset, error, beyond))
+        samples.append(_Sample(spans, knots, distance, offset, error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
 
 
@@ -313,7 +319,8 @@ def _parts(sample: _Sample, entity: EntityMotion) -> Iterator[SampledSegment]:
         inside = slice(*np.searchsorted(sample.knots, (span.first, span.last + 1)))
         if span.is_road_following and inside.stop - inside.start > 1:
             beyond = sample.beyond if span is sample.spans[-1] else np.empty(0)
-            yield SampledSegment(span, entity.time[sample.knots[inside]], sample.offset[inside], beyond)
+            time, distance = entity.time[sample.knots[inside]], sample.distance[inside]
+            yield SampledSegment(span, time, sample.offset[inside], beyond, distance)
 
 
 def _with_trailers(

@@ -19,11 +19,13 @@ from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
-from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs, largest_of
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain, Size, resized
+from xosc_lateral.world.motion.offset_path import OffsetPath, resized
+from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
@@ -57,8 +59,15 @@ STANDING_TIME = 2.0
 CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 """How fast they do so. [m/s2]"""
 
+LONGER = 1.5
+"""Times the longest of these runs, for which offsets last: an ego at 0.7 times its speed comes to a place after 1.43
+times as long, one at 0.8 times after 1.25 times. [-]"""
+LEAST_TIME = 60.0
+"""For which they do at least: where an end hangs on what a vehicle under test does, it may come late. [s]"""
 TRIAL_STEP = 0.05
 """Of runs under other egos: they are about what happens. [s]"""
+OTHER_FRAMES = (0.9, 2.5)
+"""Times a run's step, in which the source is played again where an output does something else. [-]"""
 AFTERMATH_TIME = 2.0
 """After the last event of all, such a run is over: the last lane is reached, contacts have come about. [s]"""
 
@@ -71,18 +80,19 @@ movement is again what it was. [-]"""
 LEAST_DURATION = 20.0
 """Of that run. [s]"""
 
-SIZES = (Size(), Size(limit=0.75), Size(limit=0.5), Size(0.5), Size(0.25), Size(0.0))
-"""Tried for the moves before a conflict, in order. All of them are without a path, which makes a car's way a millimetre
-longer in 400 m: the first is that alone. Limits come first, since a contact comes of the largest offsets alone."""
+SIZES = (1.0, 0.75, 0.5, 0.25, 0.0)
+"""Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
 LARGE_SHIFT = 0.3
 """Of its duration, by which an action lasts longer or shorter without a word. [-]"""
+LEAST_MOVING = 0.9
+"""Share of driving time below which it is told. [-]"""
 MOST_TRIALS = 40
 """Of a conversion: beyond, what is left is told. [-]"""
 
 Output = TypeVar("Output")
 
-Sizes = dict[int, Size]
-"""By the number of a chain, where it is driven otherwise than sampled."""
+Sizes = dict[int, float]
+"""By the number of a path, where it is driven otherwise than sampled."""
 
 Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
@@ -116,6 +126,16 @@ class Meaning:
         nominal_slower_faster = self._before[:3]
         return max(motion.end_time for _, motion in nominal_slower_faster)
 
+    @property
+    def longest(self) -> float:
+        """Time that a run may take. [s]"""
+        return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before))
+
+    def farthest(self, name: str) -> float:
+        """Distance that an entity may drive in that time, as fast as in the run in which it is fastest. [m]"""
+        runs = (one for _, motion in self._before for one in motion.entities if one.name == name)
+        return self.longest * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
+
     def _runs(self, scenario: Scenario) -> Iterator[tuple[Scenario, NominalMotion]]:
         """Each run and what was played; all but the nominal one in coarser steps, until nothing is left to happen."""
         source = self._played.scenario
@@ -129,16 +149,39 @@ class Meaning:
             step = max(self._step, TRIAL_STEP)
             yield driven, play(driven, self._played.network, step=step, time_limit=self.limit)
 
-    def compare(self, scenario: Scenario, trajectories: Collection[str]) -> tuple[list[Comparison], NominalMotion]:
-        """With an output in which some entities follow trajectories: each run with its own; the nominal run of it."""
+    def compare(
+        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str]
+    ) -> tuple[list[Comparison], NominalMotion]:
+        """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
+
+        Each run with its own; and the nominal run of the output.
+        """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         comparisons, after = [], [run for _, run in self._runs(scenario)]
         for (driven, before), run in zip(self._before, after, strict=True):
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            comparisons.append(compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends))
+            found = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
+            if found.changes:
+                chance = self._by_chance(driven, nominal, trajectories)
+                others = (one for one in found.changes if abs(one.size) > chance.get(one.what, 0.0))
+                found = structs.replace(found, changes=tuple(others))
+            movement = changed_movement(network, before, run, moved)
+            shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
+            comparisons.append(structs.replace(found, changes=(*found.changes, *movement), moving=shares))
         return comparisons, after[0]
+
+    def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
+        """What a source itself does otherwise, and by how much, in other frames: two things that meet in one. [s]"""
+        network, chance = self._played.network, dict[str, float]()
+        for factor in OTHER_FRAMES:
+            again = play(driven, network, step=factor * before.step, time_limit=self.limit)
+            ends = before.ended_by == again.ended_by
+            compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
+            sizes = {one.what: abs(one.size) + again.step for one in compared.changes}
+            chance |= {what: max(size, chance.get(what, 0.0)) for what, size in sizes.items()}
+        return chance
 
 
 def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
@@ -176,32 +219,44 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 
 
 @dataclass(frozen=True, slots=True)
-class KeptChains:
-    """Chains that leave what happens as it was, the runs with them, and what is left that could not be mended."""
+class Kept:
+    """Paths that leave what happens as it was, the runs with them, and what is left that could not be mended."""
 
-    chains: tuple[OffsetChain, ...]
+    paths: tuple[OffsetPath, ...]
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
-    smaller: dict[str, tuple[Size, bool]]  # entity -> least size of its moves; whether all chains are smaller
+    smaller: dict[str, tuple[float, bool]]  # entity -> least size of its offsets; whether all paths are smaller
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
         """The largest of each event."""
         return largest_of(self.comparisons)
 
+    @property
+    def moving(self) -> dict[str, float]:
+        """The least share of its driving time in which each entity moves sideways. [-]"""
+        least: dict[str, float] = {}
+        for name, share in (pair for one in self.comparisons for pair in one.moving.items()):
+            least[name] = min(least.get(name, 1.0), 1.0 if share is None else share)
+        return least
+
     def warnings(self, unmoved: Collection[str]) -> Iterator[str]:
         """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
-        for name in sorted(unmoved):
+        for name in sorted(unmoved & self.smaller.keys()):
             yield f"'{name}' stays as it is: {CHANGES}"
-        for name, ((factor, limit), everywhere) in sorted(self.smaller.items()):
+        for name, (factor, everywhere) in sorted(self.smaller.items()):
             if name not in unmoved:
-                size = "none" if factor == 0.0 else f"{factor:g} times what was sampled"
-                size = size if factor < 1.0 else f"at most {limit:g} times the largest that was sampled"
+                size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
                 yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+        for name, share in sorted(self.moving.items()):
+            if share < LEAST_MOVING:
+                moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
+                yield f"'{name}' {moves}, in one of the runs that it was tried in"
         for shift in self.shifts:
             longer = shift.end - shift.start
-            if shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
+            is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE
+            if is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
                 yield (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
                     f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
@@ -211,27 +266,26 @@ class KeptChains:
 
 
 def keep_meaning(
-    chains: Sequence[OffsetChain],
+    paths: Sequence[OffsetPath],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetChain]], tuple[Output, list[Comparison]]],
-) -> tuple[Output, KeptChains]:
-    """Chains as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
+    attempt: Callable[[Sequence[OffsetPath]], tuple[Output, list[Comparison]]],
+) -> tuple[Output, Kept]:
+    """Paths as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
     sizes: Sizes = {}
     trials = 1
 
-    def applied(some: Sizes) -> list[OffsetChain]:
-        driven = [resized(chain, some[k]) if k in some else chain for k, chain in enumerate(chains)]
-        return [chain for chain in driven if chain.ring.moves]
+    def applied(some: Sizes) -> list[OffsetPath]:
+        driven = [resized(path, some[k]) if k in some else path for k, path in enumerate(paths)]
+        return [path for path in driven if path.pieces]
 
-    output, comparisons = attempt(chains)
+    output, comparisons = attempt(paths)
     changes = _changes(comparisons)
     stuck = set[tuple[int, int]]()
     while changes and trials < MOST_TRIALS:
-        blamed = _blamed(changes, chains, motion, sizes, stuck)
+        blamed = _blamed(changes, paths, motion, sizes, stuck)
         if blamed is None:
             break
-        first = SIZES.index(sizes[blamed]) + 1 if blamed in sizes else int(chains[blamed].path is None)
-        for smaller in SIZES[first:]:
+        for smaller in SIZES[SIZES.index(sizes.get(blamed, 1.0)) + 1 :]:
             trial = sizes | {blamed: smaller}
             made, outcome = attempt(applied(trial))
             trials += 1
@@ -240,12 +294,11 @@ def keep_meaning(
                 break
         else:
             stuck.add((blamed, len(changes)))
-    reduced = {k: size for k, size in sizes.items() if size < Size()}
-    least: dict[str, tuple[Size, bool]] = {}
-    for name in dict.fromkeys(chains[k].entity for k in reduced):
-        theirs = [k for k, chain in enumerate(chains) if chain.entity == name]
-        least[name] = min(reduced.get(k, Size()) for k in theirs), all(k in sizes for k in theirs)
-    return output, KeptChains(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
+    least: dict[str, tuple[float, bool]] = {}
+    for name in dict.fromkeys(paths[k].entity for k in sizes):
+        theirs = [k for k, path in enumerate(paths) if path.entity == name]
+        least[name] = min(sizes.get(k, 1.0) for k in theirs), all(k in sizes for k in theirs)
+    return output, Kept(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
@@ -255,23 +308,23 @@ def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
 
 def _blamed(
     changes: Sequence[Change],
-    chains: Sequence[OffsetChain],
+    paths: Sequence[OffsetPath],
     motion: NominalMotion,
     sizes: Sizes,
     stuck: Collection[tuple[int, int]],
 ) -> int | None:
-    """The chain whose moves most likely change what happens: its entity's, the nearest before; else any other."""
+    """The path that most likely changes what happens: its entity's, the nearest before; else any other."""
 
-    def begins(chain: OffsetChain) -> float:
-        starts = [one.start for one in motion.actions if one.path == chain.after]
-        return 0.0 if chain.after is None else min(starts, default=inf)
+    def begins(path: OffsetPath) -> float:
+        starts = [one.start for one in motion.actions if one.path == path.after]
+        return 0.0 if path.after is None else min(starts, default=inf)
 
     order: list[int] = []
     for change in changes:
-        theirs = [k for k, chain in enumerate(chains) if chain.entity == change.entity]
-        order += sorted(theirs, key=lambda k: (begins(chains[k]) > change.time, -begins(chains[k])))
-    order += range(len(chains))
-    free = (k for k in order if sizes.get(k, Size()) > SIZES[-1] and (k, len(changes)) not in stuck)
+        theirs = [k for k, path in enumerate(paths) if path.entity == change.entity]
+        order += sorted(theirs, key=lambda k: (begins(paths[k]) > change.time, -begins(paths[k])))
+    order += range(len(paths))
+    free = (k for k in order if sizes.get(k, 1.0) > SIZES[-1] and (k, len(changes)) not in stuck)
     return next(free, None)
 
 

@@ -13,7 +13,7 @@ from xosc_lateral.base.errors import FormatError, did_you_mean, locate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.openscenario.write.build import Version
 from xosc_lateral.files.openscenario.write.draft import Player
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions
+from xosc_lateral.files.openscenario.write.reactive import LateralActions
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups, separable
 from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 from xosc_lateral.files.output_paths import refuse_outputs
@@ -65,7 +65,7 @@ class Plan:
     context: ContextTable | None
     # unwritable: entities whose maneuvers the target does not know, so that only a trajectory is left, and why
     unwritable: Mapping[str, str]
-    lateral: LateralActions  # of the scenario: what is to stop lane offsets
+    lateral: LateralActions  # of the scenario: what is to stop paths
 
     @property
     def played(self) -> Played:
@@ -129,7 +129,9 @@ def decide(
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
     refuse_outputs([output if saves else None, report], inputs)
-    drivers = choose_drivers(scenario, settings, egos, controllers if target.player is Player.CARLA else {})
+    lateral, for_carla = LateralActions.of(scenario), target.player is Player.CARLA
+    left = {name: control for name, control in controllers.items() if for_carla or not lateral.is_free(name)}
+    drivers = choose_drivers(scenario, settings, egos, left)
     continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
     version = target.version_for(scenario)
     plan = Plan(
@@ -150,7 +152,7 @@ def decide(
         continuous,
         context,
         _unwritable(played, settings, version, {*egos, *controllers}),
-        LateralActions.of(scenario),
+        lateral,
     )
     for at in scenario.storyboard.events() if settings.lane_changes is LaneChanges.LIFELIKE else ():
         for content in (action.content for action in at.event.actions):

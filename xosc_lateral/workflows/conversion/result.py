@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.track import Track
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.world.motion.gaps import Gap
@@ -49,14 +50,15 @@ class SampledSegment:
     """Offsets sampled on one road-following segment."""
 
     span: SegmentSpan  # the segment
-    time: FloatArray  # every 0.2 s from the segment's start, shape (n,) [s]
+    time: FloatArray  # every 0.2 s of the driver's clock from the segment's start, shape (n,) [s]
     offset: FloatArray  # added to the nominal offset, positive left, shape (n,) [m]
     # beyond: how it would go on after the segment's end, should that come later, shape (k,) [m]
     beyond: FloatArray = field(default_factory=lambda: np.empty(0))
+    distance: FloatArray | None = None  # driven at each, strictly increasing; None: where the vehicle is then [m]
 
     def later(self) -> tuple[FloatArray, FloatArray]:
         """Times after the segment's end, and offsets there. [s], [m]"""
-        time = self.time[-1] + (self.time[1] - self.time[0]) * np.arange(1, len(self.beyond) + 1)
+        time = self.time[-1] + STEP * np.arange(1, len(self.beyond) + 1)
         return time[time > self.span.end], self.beyond[time > self.span.end]
 
 

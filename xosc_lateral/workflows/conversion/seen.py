@@ -15,6 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.own_clock import is_slow, ticks_of, way_of
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
@@ -23,6 +24,7 @@ from xosc_lateral.drivers.model.sampling import Responses, responses_to
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import SegmentSpan
+from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.context import Surroundings
 
@@ -48,7 +50,8 @@ class SeenSegment(NamedTuple):
     """A road-following segment as its driver sees it, or several and what lies between and beside them."""
 
     spans: tuple[SegmentSpan, ...]  # one after another; see `movement_runs`
-    knots: IntArray  # rows of the motion that are sampled, shape (n,)
+    knots: IntArray  # rows of the motion that are sampled, shape (n,); where it is slow, those nearest to it
+    distance: FloatArray  # driven there [m]
     segment: Segment  # in a mirror where the profile is one of the other hand's traffic: `side` is -1 then, else 1
     side: float
     responses: Responses  # see `responses_to`
@@ -79,16 +82,20 @@ def seen_by(
     motion, network = surroundings.motion, surroundings.network
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
+    driven = distance_driven(entity)
     segments: list[SeenSegment] = []
     neutral, responds, alone = set[str](), set[str](), set[str]()
     for spans in runs:
-        knots = np.arange(spans[0].first, spans[-1].last + 1, every)
-        if len(knots) < 2:
+        rows = np.arange(spans[0].first, spans[-1].last + 1, every)
+        if len(rows) < 2:
             continue
+        knots, distance = _knots(entity, driven, slice(spans[0].first, spans[-1].last + 1), every)
         for span in spans:
             if span.is_road_following:
                 _refuse_no_width(entity, span, network)
-        segment = _segment(surroundings, index, knots, every, contexts)
+        segment = _segment(surroundings, index, rows, every, contexts)
+        if not np.array_equal(rows, knots):
+            segment = segment.at(np.minimum((knots - rows[0]) // every, len(rows) - 1))
         if neighbours is Neighbours.NONE:
             beside = {name: values for name, values in segment.context.items() if name in NEIGHBOURS}
             emptied = {k: np.full_like(v, np.nan if k.endswith("distance") else 0.0) for k, v in beside.items()}
@@ -99,8 +106,25 @@ def seen_by(
         responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         segment, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
-        segments.append(SeenSegment(spans, knots, segment, side, responses_to(segment, driver)))
+        segments.append(SeenSegment(spans, knots, distance, segment, side, responses_to(segment, driver)))
     return Seen(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+
+
+def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) -> tuple[IntArray, FloatArray]:
+    """Rows that are sampled, and the distance driven there [m]: a step apart on the driver's clock (`own_clock`).
+
+    Below 40 km/h these are further apart in time, and those between rows are named by the nearest; the last then lies
+    behind the end, where the car would go on as it does there.
+    """
+    time, speed = entity.time[rows], entity.speed[rows]
+    if not is_slow(speed).any():
+        knots = np.arange(rows.start, rows.stop, every)
+        return knots, driven[knots]
+    own, ticks, nearest = ticks_of(time, speed, every * float(time[1] - time[0]))
+    moved = np.flatnonzero(np.diff(own, prepend=-1.0) > 0.0)
+    distance = np.interp(ticks, own[moved], driven[rows][moved])
+    distance[-1] += max(ticks[-1] - own[-1], 0.0) * float(way_of(speed[-1:])[0])
+    return rows.start + nearest, distance
 
 
 def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
@@ -133,6 +157,8 @@ def _segment(surroundings: Surroundings, index: int, knots: IntArray, every: int
     after = int(later.min(initial=stop - knots[-1] - 1)) // every
     grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
     context = surroundings.context(index, grid)
+    on_motorway = np.array([road.is_motorway and road.junction is None for road in surroundings.network.roads], bool)
+    context["motorway"] = ((entity.road[grid] >= 0) & on_motorway[entity.road[grid]]).astype(np.float64)
     for name, (time, values) in contexts.items():
         context[name] = np.interp(entity.time[grid], time, values)
     lane_width = _filled(context["lane_width"], slice(before, len(grid) - after))

@@ -73,6 +73,9 @@ class ConvertSettings:
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
         driver alone is written.
+    jam_corridor : bool
+        Below 40 km/h on motorways (``road/type``) the leftmost lane keeps left and the others right, as laws ask.
+        Assumed: no recording that we have shows how far.
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
 
@@ -141,6 +144,10 @@ class ConvertSettings:
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
     with_sensor: bool = option(False, bool)
+    jam_corridor: bool = option(
+        False, bool, "--jam-corridor", kind=bool,
+        help="Below 40 km/h on motorways the leftmost lane keeps left, others right. Assumed: nobody measured how far.",
+    )
     strict: bool = option(
         False, bool, "--strict", kind=bool,
         help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched.",
@@ -239,6 +246,7 @@ class ConvertKeywords(TypedDict, total=False):
     attempts: int
     time_limit: float | None
     with_sensor: bool
+    jam_corridor: bool
     strict: bool
 
 

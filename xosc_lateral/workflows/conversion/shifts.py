@@ -37,6 +37,8 @@ from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
+ROUNDING = 1e-6
+"""Of times that are sums of frames. [s]"""
 LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
@@ -57,6 +59,7 @@ class Change(Struct, frozen=True):
     entity: str | None
     time: float
     how: str
+    size: float = inf  # of a shift in time; infinite: it is none [s]
 
     def __str__(self) -> str:
         """One line."""
@@ -68,6 +71,8 @@ class Comparison(Struct, frozen=True):
 
     shifts: tuple[EventShift, ...]
     changes: tuple[Change, ...]
+    # moving: share of each vehicle's driving time in which it moves sideways; None: it does not drive [-]
+    moving: Mapping[str, float | None] = {}
 
 
 def compare_runs(
@@ -98,8 +103,8 @@ def compare_runs(
             (shift.unexplained_start, shift.start, "happens"),
             (shift.unexplained_end, shift.end, "is over"),
         ):
-            if abs(rest) > EVENT_TOLERANCE:
-                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}"))
+            if abs(rest) > max(EVENT_TOLERANCE, before.step, after.step) + ROUNDING:
+                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}", moved))
     for key, action in now.items():
         if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what = _named(key, action)
@@ -218,6 +223,8 @@ class _Shifts:
         powers = _powers(then)
         duration = (then.end or 0.0) - then.start
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
+        if ways[0] < LEAST_WAY <= ways[1]:  # over at once from the middle; from beside it, it takes its time
+            return [(now.end or 0.0) - now.start - duration]
         if not powers or min(ways) < LEAST_WAY:
             return [0.0]
         return [duration * ((ways[1] / ways[0]) ** power - 1.0) for power in powers]
@@ -271,9 +278,9 @@ def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedActio
 
 def _other_end(shifts: _Shifts, before: NominalMotion, after: NominalMotion) -> Iterator[Change]:
     moved = after.end_time - before.end_time
-    if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + before.step:
+    if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + max(before.step, after.step):
         what = f"the end ({before.ended_by}) at {before.end_time:.2f} s"
-        yield Change(what, None, before.end_time, f"comes {_later(moved)}")
+        yield Change(what, None, before.end_time, f"comes {_later(moved)}", moved)
 
 
 def _other_lanes(before: NominalMotion, after: NominalMotion, ignored: Collection[str]) -> Iterator[Change]:

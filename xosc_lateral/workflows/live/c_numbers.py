@@ -13,6 +13,7 @@ import numpy as np
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, OFFSET_LANES, TIME, context_range
 from xosc_lateral.base.names import in_c
+from xosc_lateral.base.own_clock import HALF_RATE_SPEED, SPEED_SLACK
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import actuator
@@ -102,7 +103,8 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "OFFSET_LANES": OFFSET_LANES.value, "MINIMUM_LANE_WIDTH": MINIMUM_LANE_WIDTH,
         **{name: getattr(actuator, name) for name in ("RESPONSE_SPEED", "RESPONSE_ACCELERATION", "LARGEST_SPEED",
                                                       "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
-        "STEP_PEAK": paths.STEP_PEAK, "STANDSTILL": paths.STANDSTILL, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "STEP_PEAK": paths.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST, "LARGEST_SINE": paths.LARGEST_SINE,
+        "HALF_RATE_SPEED": HALF_RATE_SPEED, "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}

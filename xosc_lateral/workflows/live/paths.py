@@ -1,7 +1,7 @@
 """From a driver's curve to where his vehicle is: what leads over to his path, slow driving, moving aside.
 
 A vehicle's path has no corner (`LARGEST_TURN_RATE`): where a maneuver has moved it, its path leads over from there to
-the driver's; below 40 km/h there is less of the driver's movement.
+the driver's; below 40 km/h his movement has a slower clock (`base.own_clock`).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.own_clock import LARGEST_HEADING, clock_rate, is_slow, way_of
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle, smoother_step
-from xosc_lateral.world.surroundings.around import smooth_step
 from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
 LARGEST_TURN_RATE = 0.03
@@ -34,19 +34,25 @@ SPEEDS_REMEMBERED = 6
 """Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
 
 NEGLIGIBLE_REST = 1e-12
-"""A remainder this small is none. [m]"""
+"""A lateral speed this small is none. [m/s]"""
+
+LARGEST_SINE = float(np.sin(LARGEST_HEADING))
+"""Lateral speed over speed, at most. [-]"""
+
+CLOCK_TOLERANCE = 1e-9
+"""Share of a model step that clocks may be off when steps of a simulation are added up. [-]"""
 
 DRIVER = np.dtype(
-    [("curve", float, 6), ("begun", bool), ("following", bool), ("place", float), ("own", float),
-     ("rest", float), ("from", float), ("from_rate", float), ("share", float), ("over", float), ("slip", float),
-     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED)]
+    [("curve", float, 6), ("next", float, 6), ("ahead", bool), ("clock", float), ("own_rate", float), ("begun", bool),
+     ("following", bool), ("place", float), ("rest", float), ("from", float), ("from_rate", float), ("share", float),
+     ("over", float), ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED)]
 )  # fmt: skip
 """A driver beside his random numbers.
 
-His curve until the next model step and whether it has begun; whether the vehicle followed the road a step ago, where it
-was, and the driver's own offset there [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate`
-[m/s], done to `share` [-] of `over` [s], plus what slow driving left out (`slip` [m]); how far he has moved aside, how
-fast, and how far he wants to; speeds of the last second.
+His curve until his next model step, the one after it if that is `ahead`, how far on he is in it [-] and how fast he
+moves sideways, by his own clock [m/s]; whether he has begun; whether the vehicle followed the road a step ago, and
+where it was [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate` [m/s], done to `share` [-] of
+`over` [s]; how far he has moved aside, how fast, and how far he wants to; speeds of the last second.
 """
 
 
@@ -69,7 +75,6 @@ class Moves(NamedTuple):
 
 def drive_on(
     state: NDArray[Any],
-    u: float,
     step: float,
     passed: float | None,
     speed: FloatArray,
@@ -77,21 +82,21 @@ def drive_on(
     base: FloatArray,
     following: BoolArray,
 ) -> tuple[NDArray[Any], Moves]:
-    """The drivers' states (`DRIVER`) and moves at `u`, 0 to 1, of their curves, each of a `step` [s], shape (n,) each.
+    """The drivers' states (`DRIVER`) and moves, shape (n,) each; a curve lasts a `step` of their own clocks. [s]
 
     After so much time [s], None at the simulation's first step; see `Moment` for speed [m/s], offset, base [m] and
     following.
     """
     is_first, passed = passed is None, passed or 0.0
-    powers = u ** np.arange(6)
-    driver = state["curve"] @ powers
-    driver_rate = state["curve"][:, 1:] @ (np.arange(1, 6) * powers[:-1]) / step
-    pace = _pace(speed)
+    powers = np.clip(state["clock"], 0.0, 1.0)[:, None] ** np.arange(6)
+    driver = (state["curve"] * powers).sum(axis=1)
+    driver_rate = (state["curve"][:, 1:] * np.arange(1, 6) * powers[:, :-1]).sum(axis=1) / step
+    pace = pace_of(speed, state["own_rate"])
     is_driven = following & state["begun"]
     taken_over = is_driven & ~state["following"]
     was_rate = np.where(passed > 0.0, (offset - state["place"]) / max(passed, 1e-9), 0.0)
     _move_aside(state, passed * pace)
-    aside, aside_rate = state["aside"], state["aside_rate"] * pace
+    aside, aside_rate = state["aside"], state["aside_rate"]
     if is_first:  # who drives, began so; who is slow or stands stays where it is, and is led over as it drives off
         state["rest"][taken_over] = 0.0
         slow = taken_over & (pace < 1.0)
@@ -99,33 +104,26 @@ def drive_on(
     elif taken_over.any():
         was_rate = np.where(np.abs(was_rate) < np.maximum(0.2 * np.abs(speed), 0.1), was_rate, 0.0)  # placed anew
         was_rate = np.where(state["place"] == 0.0, 0.0, was_rate)
-        gap_rate = was_rate - driver_rate * pace - aside_rate
-        gap = offset - base - driver - aside + (driver_rate * pace + aside_rate) * passed  # a step ago
+        gap_rate = was_rate - (driver_rate + aside_rate) * pace
+        gap = offset - base - driver - aside + (driver_rate + aside_rate) * pace * passed  # a step ago
         _lead_over(state, taken_over, gap, gap_rate, speed)
-    went_on = is_driven & state["following"]
-    state["slip"] = np.where(went_on, state["slip"] - (1.0 - pace) * (driver - state["own"]), 0.0)
-    slipped = is_driven & (state["over"] <= 0.0) & (np.abs(state["slip"]) > NEGLIGIBLE_REST)
-    if slipped.any():
-        _lead_over(state, slipped, state["slip"], np.zeros(len(state)), speed)
-        state["slip"][slipped] = 0.0
-    rest_rate = _settle(state, passed * pace) * pace
-    place = np.where(is_driven, base + driver + state["rest"] + state["slip"] + aside, offset)
-    rate = np.where(is_driven, driver_rate * pace + rest_rate + aside_rate, was_rate * (passed > 0.0))
+    own_rate = driver_rate + _settle(state, passed * pace) + aside_rate
+    place = np.where(is_driven, base + driver + state["rest"] + aside, offset)
+    rate = np.where(is_driven, own_rate * pace_of(speed, own_rate), was_rate * (passed > 0.0))
     moving = np.abs(speed) > STANDSTILL
     sine = np.divide(rate, speed, out=np.zeros(len(state)), where=moving)
-    heading = np.arcsin(np.clip(sine, -1.0, 1.0))
-    state["following"], state["place"], state["own"] = is_driven, place, driver
+    most = np.where(is_slow(speed), LARGEST_SINE, 1.0)
+    # A car that stands is turned as it came to a stop: of its way in a second of the clock something is left.
+    turned = np.where(speed < 0.0, -1.0, 1.0) * np.clip(own_rate / way_of(speed), -most, most)
+    heading = np.arcsin(np.clip(np.where(is_driven, turned, sine), -1.0, 1.0))
+    state["following"], state["place"], state["own_rate"] = is_driven, place, np.where(is_driven, own_rate, 0.0)
     return state, Moves(place, np.where(is_driven, rate, 0.0), np.where(is_driven, heading, 0.0), is_driven)
 
 
-def _pace(speed: FloatArray) -> FloatArray:
-    """How much of the driver's lateral movement there is, shape as the speed [m/s]. [-]
-
-    All from 40 km/h on; below, less, so that a path runs along the lane where its car stops and drives on.
-    """
-    u = np.abs(speed) / MINIMUM_SPEED
-    u = np.where(u > 1.0 - 1e-6, 1.0, u)  # 11.1111 m/s are meant as 40 km/h
-    return smooth_step(u)
+def pace_of(speed: FloatArray, own_rate: FloatArray) -> FloatArray:
+    """Seconds of the drivers' clocks in one, shape as the speed [m/s] and their lateral speed by their clocks. [m/s]"""
+    turning = LARGEST_SINE * np.abs(speed) / np.maximum(np.abs(own_rate), NEGLIGIBLE_REST)
+    return np.asarray(np.where(is_slow(speed), np.minimum(clock_rate(speed), turning), 1.0))
 
 
 def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:

@@ -26,7 +26,7 @@ from xosc_lateral.drivers.model.seeds import of_driver
 from xosc_lateral.drivers.model.stream import sealed, unsealed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.seen import mirrored_context, sides_known
-from xosc_lateral.workflows.live.paths import DRIVER, SPEEDS_REMEMBERED, Moves, drive_on
+from xosc_lateral.workflows.live.paths import CLOCK_TOLERANCE, DRIVER, SPEEDS_REMEMBERED, Moves, drive_on, pace_of
 from xosc_lateral.world.surroundings.give_way import Response, give_way_now
 from xosc_lateral.world.surroundings.moment import Places, Roads, look_around
 
@@ -111,14 +111,16 @@ class Traffic:
         drivers = self._present([moment.names[k] for k in there])
         passed = None if self._time is None else time - self._time
         self._time = time
+        pace = pace_of(moment.speed[there], self._state["own_rate"][drivers])
+        self._state["clock"][drivers] += (passed or 0.0) * pace / self._step
         if context is not None:
             self._advance(time, moment, context, there, drivers)
+        self._turn_over(drivers)
         rate, heading = np.zeros((2, len(moment.names)))
         moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
         if len(there):
             rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
-            u = min(max(time / self._step - (self._knots - 1), 0.0), 1.0)
-            self._state[drivers], driven = drive_on(self._state[drivers], u, self._step, passed, *rows)
+            self._state[drivers], driven = drive_on(self._state[drivers], self._step, passed, *rows)
             for values, part in zip(moves, driven, strict=True):
                 values[there] = part
         return moves
@@ -184,8 +186,8 @@ class Traffic:
         if self._columns is None:
             self._columns = tuple(sorted(context))
             self._knots = self._knots_until(time) - 1
-        due = self._knots_until(time) - self._knots
-        self._knots += due
+        self._knots = self._knots_until(time)
+        u = time / self._step - (self._knots - 1)  # since the step began, of it
         wanted = self._aside(moment, there, all_drivers)
         row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
         for key, profile in self._profiles.items():
@@ -202,17 +204,39 @@ class Traffic:
             rows, drivers = np.array([row[name] for name in members]), [self._index[name] for name in members]
             other_hand = profile.left_hand != self._left_hand
             seen = mirrored_context(context) if other_hand else context
-            for _ in range(due):
-                curve = group.advance({name: seen[name][rows] for name in self._columns}, width[rows])
+            seen, side = {name: seen[name][rows] for name in self._columns}, -1.0 if other_hand else 1.0
+            self._draw(group, np.array(drivers), seen, width[rows], u, side)
             for k in np.flatnonzero(group.actuator.state["fault"]).tolist():
                 self.faults[members[k]] = fault_in_words(profile, int(group.actuator.state["fault"][k]))
-            self._state["curve"][drivers] = -curve if other_hand else curve
         state = self._state
         is_new = ~state["begun"][all_drivers]
         state["speeds"][all_drivers[is_new]] = moment.speed[there][is_new, None]
         state["begun"][all_drivers] = True
         state["speeds"][all_drivers] = np.column_stack([state["speeds"][all_drivers, 1:], moment.speed[there]])
         state["wanted"][all_drivers] = wanted[there]
+
+    def _draw(
+        self, group: OffsetGroup, drivers: IntArray, seen: Mapping[str, FloatArray], width: FloatArray, u: float,
+        side: float,
+    ) -> None:  # fmt: skip
+        """Curves of a group's drivers for all until the next step begins, `u` into this one, as each's clock has it."""
+        new = drivers[~self._state["begun"][drivers]]
+        self._state["clock"][new] = 1.0 + u
+        while True:
+            self._turn_over(drivers)
+            clock, ahead = self._state["clock"][drivers], self._state["ahead"][drivers]
+            whose = ~ahead & (clock > u + CLOCK_TOLERANCE)
+            if not whose.any():
+                return
+            self._state["next"][drivers[whose]] = side * group.advance(seen, width, whose)[whose]
+            self._state["ahead"][drivers[whose]] = True
+
+    def _turn_over(self, drivers: IntArray) -> None:
+        """On to the next curve, of those who are at the end of theirs and have it."""
+        state = self._state
+        done = drivers[state["ahead"][drivers] & (state["clock"][drivers] >= 1.0 - CLOCK_TOLERANCE)]
+        state["curve"][done], state["ahead"][done] = state["next"][done], False
+        state["clock"][done] = np.maximum(state["clock"][done] - 1.0, 0.0)
 
     def _aside(self, moment: Moment, there: IntArray, drivers: IntArray) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""

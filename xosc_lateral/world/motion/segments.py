@@ -24,16 +24,12 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import blocks
-from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
 
 ACROSS_LANE = np.pi / 4
 """Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
-
-_SPEED_SLACK = 1e-6
-"""40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [m/s, relative]"""
 
 
 class SegmentKind(Enum):
@@ -49,7 +45,7 @@ class SegmentKind(Enum):
     LATERAL_ACTION = "lateral action"
     NOT_DRIVING_LANE = "not in a driving lane"
     ACROSS_LANE = "not heading along its lane"
-    SLOW = "below 40 km/h"
+    BACKWARDS = "driving backwards"
     ROAD_END = "at the end of the road"
 
 
@@ -111,7 +107,7 @@ def movement_runs(
     """Road-following segments together with the lane changes and lane offsets between and beside them.
 
     A driver does not hold still to change lanes: what moves him inside his lane goes on. Not where he keeps a distance
-    sideways from somebody, nor where he drives too slowly, is put elsewhere at once, or is on no driving lane.
+    sideways from somebody, nor where he drives backwards, is put elsewhere at once, or is on no driving lane.
     """
     runs: list[list[SegmentSpan]] = [[]]
     for span in spans:
@@ -157,7 +153,7 @@ def _reasons(
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
         # Who overtakes on the lane of those who come towards him follows that lane.
         SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative[rows])) > np.sin(ACROSS_LANE),
-        SegmentKind.SLOW: motion.speed[rows] < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
+        SegmentKind.BACKWARDS: motion.speed[rows] < 0.0,
         SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }
 

@@ -64,6 +64,7 @@ class Road:
     directions: Mapping[int, int]  # of travel along s, by lane id
     predecessor: RoadLink | None
     successor: RoadLink | None
+    is_motorway: bool = False  # on some of it at least (``road/type``)
     section_starts: tuple[float, ...] = field(init=False)
     is_flat: bool = field(init=False)
 

@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import reduce
+from operator import or_
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -125,13 +127,15 @@ def switches(content: object) -> Iterator[tuple[Domains, bool]]:
     return ((domain, on) for domain, on in switched if on is not None)
 
 
-def gives_lateral(content: object) -> bool | None:
-    """Whether an action gives the lateral domain to a controller, or takes it back; None: neither."""
-    lateral = next((on for domain, on in switches(content) if domain is Domains.LATERAL), None)
+def gives(content: object, domains: Domains) -> bool | None:
+    """Whether an action gives one of these domains to a controller, or takes all of them back; None: neither."""
     if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
         kind = kind_of(content.controller)
-        return Domains.LATERAL in kind.drives if kind.at_once else lateral
-    return lateral
+        if kind.at_once:
+            return bool(domains & kind.drives)
+    switched = dict(switches(content))
+    on, off = (reduce(or_, (d for d in switched if switched[d] is way), Domains.NONE) for way in (True, False))
+    return True if domains & on else False if domains & off == domains else None
 
 
 def is_meant(controller: Controller, content: object) -> bool:
@@ -280,6 +284,17 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
         if domains:
             reasons[entity.name] = Control(tuple(names), domains)
     return reasons
+
+
+def driven_from_the_start(scenario: Scenario) -> dict[str, Domains]:
+    """Domains of each entity that controllers have when the storyboard begins."""
+    for_carla = scenario.header.is_left_handed
+    found = {one.name: DrivingControllers(one.controllers, for_carla=for_carla) for one in scenario.entities}
+    for private in scenario.storyboard.init.privates:
+        for action in private.actions:
+            if isinstance(action.content, private_actions.CONTROLLER) and private.entity_ref in found:
+                found[private.entity_ref].follow(action.content)
+    return {name: controllers.domains for name, controllers in found.items() if controllers.domains}
 
 
 def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:

@@ -8,7 +8,6 @@ from scipy.signal import lfilter
 
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     DEFAULT_SETTINGS,
-    _far_covariance,
     _restored,
     fit_coarse,
 )
@@ -39,22 +38,6 @@ def population(drivers: int, seconds: float, between: float, seed: int) -> tuple
     runs = [between * rng.normal() + movement(rng, seconds) for _ in range(drivers)]
     mean = float(np.concatenate(runs).mean())
     return [split_bands(run, STEP)[0] - mean for run in runs], [f"d{k}" for k in range(drivers)]
-
-
-def test_moments_far_apart_share_what_drivers_differ_by() -> None:
-    rng = np.random.default_rng(1)
-    shifts = 0.1 * rng.normal(size=200)
-    runs = [shift + 0.02 * rng.normal(size=300) for shift in shifts - shifts.mean()]
-    found, lags, pairs = _far_covariance(runs, 200, DEFAULT_SETTINGS)
-    assert found == pytest.approx(shifts.var(ddof=1), rel=0.02)
-    assert (lags[0], lags[-1]) == (30, 59)  # of a minute, from half of it on
-    assert pairs == [200 * (300 - lag * COARSE_EVERY) for lag in lags]
-
-
-def test_long_runs_are_looked_at_up_to_the_farthest_lag_only() -> None:
-    runs = [np.random.default_rng(k).normal(size=5000) for k in range(3)]
-    _, lags, _ = _far_covariance(runs, 3, DEFAULT_SETTINGS)
-    assert max(lags) < DEFAULT_SETTINGS.farthest
 
 
 @pytest.mark.parametrize("between", [0.0, 0.1])

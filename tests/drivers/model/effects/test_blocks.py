@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.kit.certified import FOLDER, contexts
-from tests.kit.effects import EXAMPLES
+from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,
@@ -54,7 +54,8 @@ def joined(parts: list[EffectTerms]) -> EffectTerms:
 
 
 def test_every_effect_is_here() -> None:
-    assert {effect.kind for effect in (*COLUMNED.values(), *HIDDEN.values())} == {kind.kind for kind in EFFECTS}
+    every = (*COLUMNED.values(), *HIDDEN.values(), *OF_OTHER_COLUMNS)
+    assert {effect.kind for effect in every} == {kind.kind for kind in EFFECTS}
     assert set(EFFECTS) <= set(known_effects())
 
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.kit.effects import EXAMPLES, ONE
+from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS, ONE
 from tests.kit.profiles import effect_from_dict, whole_terms
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.drivers.model.effects import (
@@ -145,7 +145,7 @@ def test_a_missing_column_leaves_the_movement_alone() -> None:
 
 
 def test_every_known_effect_is_tried_here() -> None:
-    assert {type(example) for example in EXAMPLES} == set(EFFECTS)
+    assert {type(example) for example in (*EXAMPLES, *OF_OTHER_COLUMNS)} == set(EFFECTS)
 
 
 @pytest.mark.parametrize("effect", EXAMPLES, ids=lambda effect: effect.kind)

@@ -1,9 +1,7 @@
 """Coarse movement of a population, and fine noise that has what its spectrum lacks.
 
-One autoregression, and drivers' own means about which it moves: it is fitted to the low-passed offset, all moments of a
-driver counting the same, and then gets back what the low-pass took near the border. Drivers' means are a random effect:
-their variance is the covariance of moments far apart in a run, less what of it the autoregression itself still
-remembers. Each needs the other, so both are fitted in turn.
+One autoregression, and drivers' own means about which it moves: both are fitted to the low-passed offset at once
+(`fit_autoregression`), and then the autoregression gets back what the low-pass took near the border.
 
 References
 ----------
@@ -21,6 +19,7 @@ from msgspec.structs import replace
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.fitting.models.likelihood import fit_autoregression
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     COARSE_EVERY,
     FREQUENCIES,
@@ -35,65 +34,6 @@ from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, ShapedNoise
 RIDGE = 1e-7
 """Share of the mean square that is added to the normal equations' diagonal. [-]"""
 
-LEAST_RESIDUAL = 0.1
-"""Share of a driver's mean square residual that his mean never takes. [-]"""
-
-WILD_SQUARE_RATIO = 9.0
-"""Mean square residual over the median driver's beyond which a driver is wild: three times as far. Drivers on a
-motorway differ by less (standard deviation of the logarithm 0.3, so that 1 in 10 000 is). [-]"""
-
-PASSES = 2
-"""The first finds the drivers' sizes, the second is weighted by them. [-]"""
-
-
-def fit_autoregression(
-    runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str], between: float = 0.0
-) -> Autoregression:
-    """Fit by least squares, all moments alike but those of wild drivers, who are measured by their own size.
-
-    The scale is the geometric mean of the drivers' residuals. Weights by how calm a moment is would drop the return of
-    whoever drifts calmly and corrects briskly, and the rest is an endless drift.
-
-    Drivers' own means are a random effect of variance `between`: it is taken out of the normal equations, where it adds
-    the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with
-    it, and a run of a minute would then forget twice too fast.
-
-    `runs`, shape (n_i,): with the mean of all taken out [any unit]; `drivers`: whose each is; `every`: one step of the
-    model in samples of the runs.
-    """
-    long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
-    pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
-             for run, _ in long]  # fmt: skip
-    nexts = [run[every * order :] for run, _ in long]
-    whose = np.unique([driver for _, driver in long], return_inverse=True)[1]
-    counts = np.bincount(whose, [len(y) for y in nexts])
-    smallest = 1e-12 * float(np.mean([np.mean(y**2) for y in nexts])) + 1e-300
-    variances = np.ones(len(counts))
-    coefficients: FloatArray = np.zeros(order)
-    for _ in range(PASSES):
-        # Only outliers are weighed: what a calm driver's short run shows of his memory is biased by what made it calm.
-        usual = np.median(variances)
-        sizes = np.where(variances > WILD_SQUARE_RATIO * usual, variances, usual)
-        normal, right = np.zeros((order, order)), np.zeros(order)
-        for past, value, size in zip(pasts, nexts, sizes[whose], strict=True):
-            normal += (past.T @ past - len(value) * between) / size
-            right += (past.T @ value - len(value) * between) / size
-        normal += RIDGE * np.trace(normal) / order * np.eye(order)
-        coefficients = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-        squares = [float(np.sum((y - past @ coefficients) ** 2)) for past, y in zip(pasts, nexts, strict=True)]
-        raw = np.bincount(whose, squares) / counts
-        between_share = between * (1.0 - coefficients.sum()) ** 2  # what the drivers' means leave in the residual
-        variances = np.maximum(raw - between_share, LEAST_RESIDUAL * raw) + smallest
-    scale = float(np.exp(0.5 * np.average(np.log(variances), weights=counts)))
-    return Autoregression(stabilise(coefficients), scale)
-
-
-MAXIMUM_TURNS = 20
-"""Of fitting both in turn at most: each leaves less than a third of the last one's error on runs of a minute. [-]"""
-
-SHARE_TOLERANCE = 1e-3
-"""Change of the drivers' share of the variance at which they end. [-]"""
-
 HALF_GAIN = 0.5
 """Of the measuring low-pass at its border. Beyond, most is not coarse, and the building low-pass takes it away. [-]"""
 
@@ -103,44 +43,12 @@ def fit_coarse(
 ) -> tuple[Autoregression, float]:
     """Autoregression at one step a second [lane widths], and the variance between drivers [lane widths squared].
 
-    From low-passed runs at 5 Hz, shape (n_i,), the mean of all taken out [lane widths], and whose drive each is of.
+    From low-passed runs at 5 Hz, shape (n_i,), [lane widths], and whose drive each is of.
     """
     longest = max(map(len, slow)) * settings.step
     order = max(2, min(settings.order, int(0.4 * longest)))
-    several = len(set(drives)) > 1
-    variance = float(np.mean(np.concatenate(slow) ** 2))
-    covariance, lags, pairs = _far_covariance(slow, len(set(drives)), settings) if several else (0.0, [1], [1])
-    between = float(np.clip(covariance, 0.0, 0.9 * variance))
-    for _ in range(MAXIMUM_TURNS):
-        coarse = fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives, between=between)
-        if not several:
-            break
-        remembered = coarse.covariance(max(lags) + 1)
-        share = float(np.average(remembered[lags] / remembered[0], weights=pairs))
-        before, between = between, (covariance - share * variance) / (1.0 - share)
-        between = float(np.clip(between, 0.0, 0.9 * variance))
-        if abs(between - before) < SHARE_TOLERANCE * variance:
-            break
+    coarse, between = fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives)
     return _restored(coarse, settings.step), between
-
-
-def _far_covariance(
-    slow: Sequence[FloatArray], drivers: int, settings: FitSettings
-) -> tuple[float, list[int], list[int]]:
-    """Covariance of moments far apart in one run; at which lags in coarse steps, and from how many pairs each."""
-    lengths = np.array([len(run) for run in slow])
-    order = np.argsort(lengths)
-    typical = lengths[order][np.searchsorted(np.cumsum(lengths[order]), 0.5 * lengths.sum())]
-    reach = min(float(typical), settings.farthest / settings.step) / COARSE_EVERY
-    lags = list(range(max(1, int(settings.far[0] * reach)), max(2, int(settings.far[1] * reach))))
-    total, pairs = np.zeros(len(lags)), np.zeros(len(lags), dtype=np.int64)
-    for run in slow:
-        for k, lag in enumerate(lags):
-            if len(run) > lag * COARSE_EVERY:
-                total[k] += run[lag * COARSE_EVERY :] @ run[: len(run) - lag * COARSE_EVERY]
-                pairs[k] += len(run) - lag * COARSE_EVERY
-    # The common mean was taken out, and with it a part of the differences between a few drivers.
-    return float(total.sum() / max(pairs.sum(), 1) * drivers / (drivers - 1)), lags, pairs.tolist()
 
 
 def _restored(coarse: Autoregression, step: float) -> Autoregression:
@@ -272,9 +180,6 @@ class FitSettings:
     compared_windows: tuple[float, ...] = (30.0, 20.0, 10.0)
     fine_window: float = 2.0
     coarse_window: float = 5.0  # Windows that volatility is seen by. [s]
-    # Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`.
-    far: tuple[float, float] = (0.5, 1.0)
-    farthest: float = 120.0  # [s]
     snippet: float = 10.0  # Length of the snippets that are compared. [s]
     rounds: int = 3  # Of simulating and comparing: more change nothing beyond the standard error of held-out drives.
     seed: int = 20240517  # Of the simulations.

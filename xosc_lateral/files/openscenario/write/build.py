@@ -226,6 +226,26 @@ class TimedVertices(Struct, frozen=True, eq=False):
             yield (f"\n{indent}" if begin else "") + text
 
 
+class FreeVertices(Struct, frozen=True, eq=False):
+    """Vertices of a path without times, which its entity begins wherever it is."""
+
+    entity: str
+    beside: FloatArray  # from there, along s and t of its road, shape (2, n) [m]
+    places: FloatArray  # x and y of those after them, shape (2, m) [m]
+
+    def text(self, indent: str, unit: str) -> Iterator[str]:
+        """XML of the vertices, as in `TimedVertices`; each has some time, which the schemas ask for."""
+        holder = etree.tostring(etree.Element("RelativeRoadPosition", entityRef=self.entity), encoding="unicode")
+        relative = holder[:-2].replace("%", "%%") + ' ds="%s" dt="%s"/>'
+        n, every = self.beside.shape[1], self.beside.shape[1] + self.places.shape[1]
+        time = 0.1 * np.arange(every)
+        numbers = decimals(np.vstack((time[:n], self.beside)).T, (1, 3, 6))
+        numbers += decimals(np.vstack((time[n:], self.places)).T, (1, 5, 5))
+        vertex = f'<Vertex time="%s">\n{indent}{unit}<Position>{{}}</Position>\n{indent}</Vertex>'
+        texts = [vertex.format(relative)] * n + [vertex.format('<WorldPosition x="%s" y="%s"/>')] * (every - n)
+        yield f"\n{indent}".join(texts) % numbers
+
+
 class Vertices:
     """Polylines of a document, and where in it they go.
 
@@ -234,9 +254,9 @@ class Vertices:
 
     def __init__(self, source: bytes) -> None:
         self._mark = f"vertices-{hashlib.sha256(source).hexdigest()[:32]}"
-        self._polylines: list[TimedVertices] = []
+        self._polylines: list[TimedVertices | FreeVertices] = []
 
-    def add(self, owner: etree._Element, polyline: TimedVertices) -> None:
+    def add(self, owner: etree._Element, polyline: TimedVertices | FreeVertices) -> None:
         """Let an element hold these vertices and nothing else."""
         owner.append(etree.ProcessingInstruction(self._mark, str(len(self._polylines))))
         self._polylines.append(polyline)

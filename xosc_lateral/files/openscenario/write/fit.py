@@ -14,13 +14,13 @@ from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.carla import fit_carla
 from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Player, TargetPlayer, WrittenScenario
-from xosc_lateral.files.openscenario.write.lane_offset_scenario import LateralActions, add_lane_offsets
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.files.openscenario.write.losses import Losses
+from xosc_lateral.files.openscenario.write.reactive import LateralActions, add_paths
 from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version
 from xosc_lateral.world.motion.nominal import NominalMotion
-from xosc_lateral.world.motion.offset_chain import OffsetChain
+from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.parameters import ExpressionError
 from xosc_lateral.world.scenario.scenario import Scenario
 
@@ -31,7 +31,7 @@ def write_converted(
     trajectories: Mapping[str, Track],
     output: Path | str,
     *,
-    chains: Sequence[OffsetChain] | None = None,
+    paths: Sequence[OffsetPath] | None = None,
     lateral: LateralActions | None = None,
     provenance: Mapping[str, Any],
     summary: str,
@@ -42,7 +42,7 @@ def write_converted(
 
     - `motion`: the run; gives the times of kept actions, standstill, teleports and the end; how often an action runs
     - `trajectories`: per entity, on the rows of `motion`; those of trailers are ignored in a replay
-    - `chains`: of those who get lane offsets, from their start and after each lateral action: the scenario stays
+    - `paths`: of those who keep their maneuvers, from their start and after each lateral action: the scenario stays
       reactive. None: a replay, in which all that is no trajectory happens when it happened in the run
     - `lateral`: actions of the scenario, where they are known; `provenance`: JSON values
     - `summary`: of the provenance, for the header's description; `save`: else the bytes are only handed back
@@ -51,12 +51,12 @@ def write_converted(
     half-written; `ValueError`: a trajectory holds NaN or does not fit the motion.
     """
     draft = Draft(scenario, motion, target)
-    if chains is None:
+    if paths is None:
         converted = replay(draft, trajectories)
     else:
-        converted = add_lane_offsets(draft, chains, lateral or LateralActions.of(scenario), trajectories)
+        converted = add_paths(draft, paths, lateral or LateralActions.of(scenario), trajectories)
     draft.override_parameters()
-    _fit(draft, converted, is_reactive=chains is not None)
+    _fit(draft, converted, is_reactive=paths is not None)
     rewrite_paths(draft, Path(output))
     mark(draft.root, provenance, summary)
     sha256, content, data = write_sealed(Path(output), draft.vertices.document(draft.root), save=save)
@@ -124,10 +124,9 @@ def _absolute(path: Path) -> Path:
 
 # ---- what esmini (3.6.0) wants: the one place of its quirks ----
 # All outputs are written such that it plays them to the millimetre, since other players mind none of that: vertices
-# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; lane offsets as half
-# cosines whose duration follows from the lateral acceleration (`offset_chain`); triggers without an edge, which it
-# would miss in its first frame. It reads every version, and passes over the `Motion` of vertices, since their times
-# say the same.
+# at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands; triggers without
+# an edge, which it would miss in its first frame. It reads every version, and passes over the `Motion` of vertices,
+# since their times say the same.
 _STOPS_AT = {
     ("Polyline", "Interpolation"),
     ("RoutingAction", "PreferredLaneLayerAction"),

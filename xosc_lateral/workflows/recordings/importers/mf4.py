@@ -217,10 +217,10 @@ def _compute_formulas() -> None:
             continue
 
         def convert(
-            self: Any, values: Any, *more: Any, kind: int = kind, its: Any = conversion.convert, **said: Any
+            self: Any, values: Any, *more: Any, kind: int = kind, its: Any = conversion.convert, **keywords: Any
         ) -> Any:
             computed = self.conversion_type == kind
-            return evaluate(str(self.formula), values) if computed else its(self, values, *more, **said)
+            return evaluate(str(self.formula), values) if computed else its(self, values, *more, **keywords)
 
         convert.kind = kind  # type: ignore[attr-defined]
         conversion.convert = convert

@@ -8,7 +8,7 @@ from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.player.actions.base import Domain, Maker, RunningPrivateAction
 from xosc_lateral.world.player.paths.base import PathPoint, PathProgress
 from xosc_lateral.world.player.paths.registry import VERTEX_RADIUS, duration, path_of
-from xosc_lateral.world.player.positions.resolve import pose_of
+from xosc_lateral.world.player.positions.resolve import poses_of
 from xosc_lateral.world.player.state import free
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.positions import HALF_PI, difference
@@ -35,7 +35,7 @@ class RunningFollowTrajectory(RunningPrivateAction):
         follow = content.following_mode is FollowingMode.FOLLOW
         before = state.plane
         timed, trajectory = self._is_timed, content.trajectory
-        path = path_of(trajectory, self.simulation, pose_of, follower=state, follow=follow, is_timed=timed)
+        path = path_of(trajectory, self.simulation, poses_of, follower=state, follow=follow, is_timed=timed)
         self._path = path
         timing = content.timing
         if timing is not None and timing.offset and timing.domain is ReferenceContext.RELATIVE:

@@ -30,7 +30,7 @@ class Layout(Struct, frozen=True):
     """What laying out a path depends on: who follows it, how, how fast [m/s], whether it goes on at its start."""
 
     simulation: Simulation
-    locate: Callable[[positions.Position, Simulation], Pose]
+    locate: Callable[[Sequence[positions.Position], Simulation], list[Pose]]
     place: Place
     follower: EntityState | None
     follow: bool
@@ -38,7 +38,7 @@ class Layout(Struct, frozen=True):
 
     def pose_of(self, position: positions.Position) -> Pose:
         """World pose of a position now. [m], [rad]"""
-        return self.locate(position, self.simulation)
+        return self.locate([position], self.simulation)[0]
 
     def note(self, what: str) -> None:
         """Say that the trajectory is not followed as written."""
@@ -52,7 +52,8 @@ class Layout(Struct, frozen=True):
 def _polyline(shape: positions.Polyline, layout: Layout) -> Path:
     if not shape.vertices:
         raise layout.error("the polyline has no vertices")
-    corners = [_corner(vertex, layout) for vertex in shape.vertices]
+    poses = layout.locate([vertex.position for vertex in shape.vertices], layout.simulation)
+    corners = [_corner(vertex, pose) for vertex, pose in zip(shape.vertices, poses, strict=True)]
     _check_times([corner.time for corner in corners], "vertex", layout)
     if has_gaps_in_time(corners):
         layout.note("vertices without a time get it by their distance from those that have one")
@@ -68,10 +69,9 @@ def _polyline(shape: positions.Polyline, layout: Layout) -> Path:
     return PolylinePath(merged, follow=layout.follow, initial_speed=speed)
 
 
-def _corner(vertex: positions.Vertex, layout: Layout) -> Corner:
+def _corner(vertex: positions.Vertex, pose: Pose) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
-    pose = layout.pose_of(position)
     orientation = position if isinstance(position, positions.WorldPosition) else getattr(position, "orientation", None)
     heading, pitch, roll = (
         nan if getattr(orientation, angle[0], None) is None else getattr(pose, angle)
@@ -162,13 +162,13 @@ SHAPES: dict[type, Callable[[Any, Layout], Path]] = {
 def path_of(
     trajectory: positions.Trajectory,
     simulation: Simulation,
-    pose_of: Callable[[positions.Position, Simulation], Pose],
+    poses_of: Callable[[Sequence[positions.Position], Simulation], list[Pose]],
     *,
     follower: EntityState | None = None,
     follow: bool = False,
     is_timed: bool = False,
 ) -> Path:
-    """A trajectory laid out in the world as it is now; `pose_of` tells where a position is.
+    """A trajectory laid out in the world as it is now; `poses_of` tells where positions are.
 
     A closed one ends where it starts, unless it is followed by its times (`is_timed`), which say nothing of that piece.
     """
@@ -176,7 +176,7 @@ def path_of(
     if isinstance(shape, Unsupported):
         raise shape.place.error(shape.reason or f"a {shape.kind} can't be followed", UnsupportedElementError)
     closes = trajectory.closed and not is_timed
-    layout = Layout(simulation, pose_of, trajectory.place, follower, follow, closes)
+    layout = Layout(simulation, poses_of, trajectory.place, follower, follow, closes)
     path = SHAPES[type(shape)](shape, layout)
     start, end = path.at(0.0), path.at(path.length)
     if closes and (gap := hypot(end.x - start.x, end.y - start.y)) > VERTEX_RADIUS:

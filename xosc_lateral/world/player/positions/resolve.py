@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import cos, nan, pi, sin
+
+import numpy as np
 
 from xosc_lateral.base.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.world.player.distances import Spot
@@ -57,6 +59,36 @@ def pose_of(position: positions.Position, simulation: Simulation) -> Pose:
     if isinstance(position, positions.WorldPosition) and None not in (position.z, position.p, position.r):
         return _world_pose(position)  # nothing of it is the road's, which need not be looked for
     return world_pose(simulation.network, resolve(position, simulation))
+
+
+def poses_of(places: Sequence[positions.Position], simulation: Simulation) -> list[Pose]:
+    """World poses of many positions now; a path beside one entity is found on one way along the road."""
+    beside = list[positions.RelativeRoadPosition]()
+    for place in places:
+        if not isinstance(place, positions.RelativeRoadPosition) or place.orientation is not None:
+            break
+        if beside and place.entity_ref != beside[0].entity_ref:
+            break
+        beside.append(place)
+    found = _poses_beside(beside, simulation) if beside else []
+    return found + [pose_of(place, simulation) for place in places[len(beside) :]]
+
+
+def _poses_beside(places: Sequence[positions.RelativeRoadPosition], simulation: Simulation) -> list[Pose]:
+    """As `relative_road_position` has each."""
+    state, network, driven = entity_on_road(places[0], simulation), simulation.network, 0.0
+    scout = EntityState(state.entity, network, route=state.route)
+    scout.put(state.place._replace(pose=None))
+    way, rows = 1, list[tuple[int, float, float]]()
+    for place in places:
+        before = scout.is_forward
+        travel(scout, way, place.ds - driven)
+        driven, way = place.ds, way if scout.is_forward is before else -way
+        rows.append((scout.road, scout.s, scout.t + place.dt))
+    road, s, t = (np.array(column) for column in zip(*rows, strict=True))
+    poses = network.road_to_world(road, s, t)
+    columns = (poses.x, poses.y, poses.z, poses.heading, poses.pitch, poses.roll)
+    return [Pose(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
 
 def route_guide(route_: positions.Route, simulation: Simulation) -> RouteGuide | None:
@@ -171,7 +203,7 @@ def _nearby_place(
 
 def trajectory_position(position: positions.TrajectoryPosition, simulation: Simulation) -> Placement:
     """Relative headings count from the trajectory's."""
-    point = path_of(position.trajectory, simulation, pose_of).at(position.s)
+    point = path_of(position.trajectory, simulation, poses_of).at(position.s)
     heading = headed(position.orientation, point.heading, simulation)
     x = point.x - position.t * sin(point.heading)
     y = point.y + position.t * cos(point.heading)

@@ -1,0 +1,129 @@
+"""Paths of vehicles that react, played: over turns and joints, behind an ego that stops; and what the check sees."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import xosc_lateral as xl
+from tests.kit.made import reactive
+from tests.kit.made.roads import ROADS
+from tests.kit.places import hand_written
+from tests.kit.scenario_files import (
+    entity,
+    private,
+    scenario_text,
+    speed_action,
+    teleport,
+    time_condition,
+    write_scenario,
+)
+from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
+from tests.world.scenario.test_under_test import event, headway, stories
+from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.conversion.meaning import with_speeds
+from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
+from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
+from xosc_lateral.world.motion.way import way_of
+from xosc_lateral.world.player.player import play
+
+ROUTE = (
+    '<PrivateAction><RoutingAction><AssignRouteAction><Route name="r" closed="false">'
+    '<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="60"/></Position></Waypoint>'
+    '<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="3" laneId="-1" s="300"/></Position></Waypoint>'
+    "</Route></AssignRouteAction></RoutingAction></PrivateAction>"
+)
+
+
+@pytest.fixture
+def turning(tmp_path: Path) -> Path:
+    """T turns off at a junction, and brakes if Ego, who goes straight on, comes near."""
+    brake = reactive._event("brake", reactive._distance("Ego", "T", 8.0, "lessThan"), reactive._speed(9.0, 2.0))
+    cars = [("Ego", -1, 20.0, 18.0), ("T", -1, 60.0, 18.0)]
+    text = reactive._scenario(cars, [reactive._group("T", brake)], reactive._time(22))
+    at = text.index("</Private>", text.index('<Private entityRef="T"'))
+    (tmp_path / "road.xodr").write_text(ROADS["junction"](np.random.default_rng(1), 1).xml())
+    path = tmp_path / "turning.xosc"
+    path.write_text(text[:at] + ROUTE + text[at:])
+    return path
+
+
+def _car(path: Path, name: str = "T") -> EntityMotion:
+    return next(one for one in play_scenario(path).motion.entities if one.name == name)
+
+
+def test_a_car_moves_through_a_turn_and_takes_it(turning: Path, tmp_path: Path) -> None:
+    made = xl.convert(turning, tmp_path / "out.xosc", seed=1)
+    assert made.modes == {"T": "lane-offset"}
+    source, car = _car(turning), _car(tmp_path / "out.xosc")
+    assert (source.road[-1], source.lane[-1]) == (car.road[-1], car.lane[-1])
+    assert car.road[-1] == 2 and (moving_share(car) or 0.0) > 0.95
+    away = np.hypot(car.x - source.x, car.y - source.y)
+    assert away.max() < 1.0 and np.abs(np.diff(away)).max() < 0.02
+    turned = np.abs(np.angle(np.exp(1j * (car.heading - source.heading))))
+    assert turned.max() < 0.04
+
+
+def test_a_way_ends_where_s_turns_round_and_goes_on_behind() -> None:
+    """On a ring of two roads that are drawn against each other, on and on."""
+    network = hand_written("ring")
+    time = np.arange(0.0, 10.0, 0.1)
+    rows = {name: np.zeros(len(time)) for name in ("y", "offset", "heading_relative", "speed")}
+    road, lane = np.zeros(len(time), dtype=np.int32), np.full(len(time), -1, dtype=np.int32)
+    rows |= {"x": 20.0 * time, "s": 20.0 * time, "road": road, "lane": lane}
+    activity = np.ones(len(time), dtype=np.uint8)
+    motion = EntityMotion.of(made_vehicle("T", 4.8, 1.9, 1.4), time, **rows, activity=activity)
+    way = way_of(motion, network, 700.0, has_route=False)
+    assert [one.why for one in way.breaks] == ["s runs the other way"] * 2
+    first = way.breaks[0]
+    assert first.distance == pytest.approx(314.2, abs=5.0) and first.place.road == "a"
+    assert first.lanes[0].road == "b" and first.side == -1.0 and way.side_at(400.0) == -1.0
+    assert way.span_at(400.0) == pytest.approx((314.2, 628.3), abs=5.0)
+
+
+TIED = (
+    '<PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics dynamicsShape="linear" value="1" '
+    'dynamicsDimension="time"/><SpeedActionTarget><RelativeTargetSpeed entityRef="Ego" value="0" continuous="true" '
+    'speedTargetValueType="delta"/></SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction>'
+)
+
+
+def test_a_car_whose_speed_is_tied_to_an_ego_that_stops_stands_straight_and_goes_on(tmp_path: Path) -> None:
+    places = {"Ego": "50", "A": "150"}
+    init = private("Ego", teleport(places["Ego"]), speed_action("20"))
+    init += private("A", teleport(places["A"]), speed_action("20"), TIED)
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"),
+        init=init,
+        stories=stories(("A", event("late", headway("Ego", "A"), speed_action("20")))),
+        stop=time_condition(30),
+    )
+    path = write_scenario(tmp_path, text)
+    assert xl.convert(path, tmp_path / "out.xosc", seed=1).modes == {"A": "lane-offset"}
+    played = play_scenario(tmp_path / "out.xosc")
+    stopping = with_speeds(played.scenario, played.motion, ["Ego"], ((5.0, 0.0, 5.0), (14.0, 1.0, 3.0)))
+    car = next(one for one in play(stopping, played.network, step=0.02).entities if one.name == "A")
+    stands = np.abs(car.speed) < 0.01
+    assert stands.sum() > 100 and np.ptp(car.offset[stands]) < 1e-6
+    assert np.abs(np.sin(car.heading_relative[np.abs(car.speed) < 2.0])).max() < 0.01
+    assert (moving_share(car) or 0.0) > 0.95
+
+
+def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turning: Path) -> None:
+    played = play_scenario(turning)
+    motion = played.motion
+    car = next(one for one in motion.entities if one.name == "T")
+
+    def seen(**columns: np.ndarray) -> list[str]:
+        other = tuple(car.having(**columns) if one is car else one for one in motion.entities)
+        return [str(one) for one in changed_movement(played.network, motion, replace(motion, entities=other), ["T"])]
+
+    later = car.time > 5.0
+    assert seen() == []
+    assert "is put" in seen(y=car.y + np.clip(0.5 * (car.time - 5.0), 0.0, 0.4))[0]
+    assert "is turned by 0.30 rad" in seen(heading_relative=car.heading_relative + np.where(later, 0.3, 0.0))[0]
+    road = np.where(car.road == 2, 1, car.road).astype(np.int32)
+    assert "drives onto road '2' as number 2" in seen(road=road)[0]

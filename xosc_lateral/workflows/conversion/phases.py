@@ -1,0 +1,183 @@
+"""Phases of a vehicle that keeps its maneuvers, and the path that it drives in each.
+
+From its start, from the end of each action that moves it sideways, and from behind each place that no path leads over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from msgspec import structs
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.own_clock import way_of as way_of_clock
+from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
+from xosc_lateral.workflows.conversion.plan import Plan
+from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.offset_path import (
+    APPROACH_TIME,
+    Bridge,
+    Offset,
+    OffsetPath,
+    PathPiece,
+    Spacing,
+    approached,
+    calm,
+    pieces_along,
+    spacing_of,
+)
+from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
+from xosc_lateral.world.motion.way import LANE_ENDS, Break, way_of
+from xosc_lateral.world.scenario.controllers import Domains
+from xosc_lateral.world.scenario.private_actions import LATERAL, AcquirePositionAction, AssignRouteAction
+
+LEAST_LENGTH = 20.0
+"""A shorter path is none: it would hardly leave where it begins. [m]"""
+BRIDGE_START, BRIDGE_TIME = 2.0, 0.1
+"""The first place of a bridge is so far ahead, and as far as is driven in two frames of 0.05 s. [m], [s]"""
+BRIDGE_END = 5.0
+"""It ends so far before the place where the next path begins. [m]"""
+Path = tuple[str, ...]
+"""Names of an action from the story down."""
+
+
+def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
+    """Paths of one entity; none where a controller moves it along, which a path would double."""
+    phases = _Phases(entity, plan)
+    actions = plan.lateral.by_entity.get(entity.name, ())
+    is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
+    found = list[OffsetPath | None]()
+    if not plan.lateral.from_the_start.get(entity.name, Domains.NONE):
+        is_there = bool(entity.motion.activity[0] & Activity.ACTIVE)
+        found.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
+    if not is_moved_along:
+        found += phases.behind_breaks(found[0] if found else None)
+    for action in actions:
+        if not action.adds and (action.steers is False or (action.steers is None and not is_moved_along)):
+            found.append(phases.after(action.path))
+    return (path for path in found if path is not None)
+
+
+class _Phases:
+    """Of one entity, with the offsets that it has in the nominal run there, or else with its longest ones."""
+
+    def __init__(self, entity: EntityResult, plan: Plan) -> None:
+        self._entity, self._plan, self._network = entity, plan, plan.played.network
+        motion = entity.motion
+        self._own = [one for one in plan.extended.motion.actions if one.actor == entity.name]
+        self._lateral = {one.path for one in plan.lateral.by_entity.get(entity.name, ())}
+        self._driven = distance_driven(motion)
+        reach = plan.prepared.meaning(tuple(plan.egos)).farthest(entity.name)
+        has_route = any(isinstance(one.action.content, AssignRouteAction | AcquirePositionAction) for one in self._own)
+        self._way = way_of(motion, self._network, reach, has_route=has_route)
+        self._offset = deviation_through(
+            [_sampled(one, motion, self._driven, is_last=one is entity.segments[-1]) for one in entity.segments]
+        )
+        self._spacing = self._spacing_of(motion)
+
+    def from_the_start(self, adding: Path | None) -> OffsetPath | None:
+        """It is put down where its offsets begin, unless it is added later, or begins with a lateral action.
+
+        Whoever tows a trailer starts where it is written: put down aside, the trailer would swing.
+        """
+        motion, name = self._entity.motion, self._entity.name
+        first = [one for one in self._own if one.path == ("Init",) and isinstance(one.action.content, LATERAL)]
+        time = max((np.inf if one.end is None else one.end for one in first), default=0.0)
+        if time > motion.time[-1]:
+            return None
+        is_aside = adding is None and time == 0.0 and name not in self._plan.played.trailers.values()
+        start = float(self._offset(np.zeros(1))[0]) if is_aside else 0.0
+        path = self._path(adding, self._driven_at(time), start)
+        if path is None or not is_aside:
+            return path if path is None else structs.replace(path, time=time)
+        direction = float(self._network.travel_directions(motion.road[:1], motion.lane[:1])[0])
+        placed_t = direction * float(motion.offset[0]) + path.side * start
+        return structs.replace(path, placed_t=placed_t, start=start)
+
+    def after(self, action: Path) -> OffsetPath | None:
+        """From the end of an action in the nominal run, or else as on the longest segment."""
+        ends = [one.end for one in self._own if one.path == action and one.end is not None]
+        if ends:
+            return self._path(action, self._driven_at(min(ends)), 0.0)
+        longest = max(self._entity.segments, key=lambda one: one.span.end - one.span.start)
+        return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
+
+    def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
+        """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
+        known: float | None = 0.0 if first is None else first.end
+        actions = [self._driven_at(one.start) for one in self._own if one.path in self._lateral]
+        for one in self._way.breaks:
+            if any(at < one.behind for at in actions):
+                known = None
+            path = self._path(None, one.behind, known) if one.lanes else None
+            if path is not None:
+                known = None if known is None else path.end
+                yield structs.replace(path, places=one.lanes)
+
+    def _path(
+        self, after: Path | None, begin: float, start: float | None, *, is_nominal: bool = True
+    ) -> OffsetPath | None:
+        """From a distance along the way on, and an offset there, if it is known; None: too short, or off the road."""
+        way, depends = self._way, self._plan.depends
+        if not len(way.distance):
+            return None
+        begin += FIRST_WAIT * self._speed_at(begin)
+        is_known = is_nominal and (after is None or after not in depends.ends)
+        ahead = way.next_break(begin) if is_known else None
+        end = float(way.distance[-1]) if ahead is None else ahead.distance - END_MARGIN
+        if end - begin < LEAST_LENGTH:
+            return None
+        actions = {one.path: self._driven_at(one.start) for one in self._own if one.path in self._lateral}
+        foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
+        cut = min(foreseen, default=np.inf) if is_known else np.inf
+        cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
+        offset: Offset = self._offset
+        if start is not None:
+            offset = approached(offset, begin, start, APPROACH_TIME * self._speed_at(begin))
+        pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))
+        is_followed = ahead is not None and ahead.lanes and ahead.why != LANE_ENDS and start is not None
+        if ahead is not None and is_followed and not any(begin < at < ahead.behind for at in actions.values()):
+            end = ahead.behind - BRIDGE_END
+            waits = FIRST_WAIT * (len(pieces) - 1)
+            pieces.append(self._bridge(offset, ahead, end, BRIDGE_TIME + waits))
+        crossed = begin if ahead is None else ahead.distance
+        ends = tuple(one.place for one in way.breaks if not is_known or one.distance > crossed)
+        span = (0.0, np.inf) if is_known else way.span_at(begin)
+        side, last = way.side_at(begin), float(offset(np.array([end]))[0])
+        return OffsetPath(self._entity.name, after, tuple(pieces), side, ends=ends, span=span, end=last)
+
+    def _bridge(self, offset: Offset, over: Break, end: float, late: float) -> Bridge:
+        """Over a place that no other path leads over: the lane of the nominal way is known, without actions before."""
+        at = self._spacing.between(over.distance - END_MARGIN, end)
+        rows, aside = at >= at[0] + BRIDGE_START + late * self._speed_at(float(at[0])), calm(offset, at)
+        return Bridge(*self._way.points(self._network, at[rows], aside[rows]))
+
+    def _speed_at(self, distance: float) -> float:
+        return float(np.interp(distance, self._driven, np.abs(self._entity.motion.speed)))
+
+    def _driven_at(self, time: float) -> float:
+        return float(np.interp(time, self._entity.motion.time, self._driven))
+
+    def _spacing_of(self, motion: EntityMotion) -> Spacing:
+        distance, rows = np.unique(self._way.distance, return_index=True)
+        places = (column[rows] for column in (self._way.road, self._way.lane, self._way.s))
+        return spacing_of(
+            distance, np.interp(distance, self._driven, motion.speed), self._network.lane_curvature(*places)
+        )
+
+
+def _sampled(segment: SampledSegment, motion: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
+    """One segment by the distance driven; the last one with what was sampled beyond it, at its usual speed."""
+    distance, offset = segment.distance, segment.offset
+    if distance is None:
+        distance = np.interp(segment.time, motion.time, driven)
+    settling = SETTLING_TIME * motion.speed[[segment.span.first, segment.span.last]]
+    if is_last and len(segment.beyond):
+        usual = float(np.median(np.abs(motion.speed[segment.span.first : segment.span.last + 1])))
+        step = STEP * float(way_of_clock(np.array([usual]))[0])
+        distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
+        offset = np.append(offset, segment.beyond)
+    return SampledDeviation(distance, offset, (float(settling[0]), float(settling[1])))
