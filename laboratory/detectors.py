@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zlib import crc32
@@ -25,17 +25,13 @@ from laboratory.detector_table import (
     alarm_figure,
     alarm_lines,
     default_lines,
-    trained_cells,
-    trained_lines,
-    tuned_lines,
 )
 from laboratory.markers import show
 from laboratory.shortcut import played_variants, shortcut_lines
 from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.detectors import RULES, LateralSpeed
-from xosc_lateral.workflows.detection.logistic import train
-from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, USUAL_SENSOR, Sensor, View, views_of
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor, View, views_of
 from xosc_lateral.workflows.detection.sources import SourceSettings, checked, drive_scenes, sources_of
 from xosc_lateral.workflows.detection.tracks import Scene
 
@@ -137,34 +133,18 @@ def pools(given: Given, folder: Path) -> dict[str, Views]:
     return found
 
 
-# ---- trained on one, tested on another -------------------------------------------------------------------------------
-def training(given: Given, folder: Path) -> dict[str, list[Scene]]:
-    """Scenes by what they are; no vehicle of the recording's other half had a part in any of them."""
-    table, scenarios = drive_table(given.wheel), given.scenarios
-    half = xl.write_profile(
-        xl.fit(table[[_half(name) == 0 for name in table["drive"]]], name="half"), folder / "half.json"
-    )
-    lifelike = partial(scenes_of, scenarios, str(half), 2 * given.variants)
-    return {
-        "nominal": list(scenes_of(scenarios)),
-        "lifelike: half of the recording": list(lifelike()),
-        "the same, lane changes lifelike": list(lifelike(lane_changes="lifelike")),
-        "real: half of the recording": list(half_of(recorded(given.wheel), 0)),
-    }
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path)
     parser.add_argument("--alks", type=Path, required=True)
     parser.add_argument("--openacc", type=Path, nargs="+", required=True, metavar="FILE")
     parser.add_argument("--variants", type=int, default=2)
-    parser.add_argument("--part", choices=("alarms", "trained", "shortcut"), nargs="+", help="default: all")
+    parser.add_argument("--part", choices=("alarms", "shortcut"), nargs="+", help="default: all")
     parser.add_argument("--write", type=Path, help="page with the markers")
     parser.add_argument("--figure", type=Path, help="false alarms by lateral speed (.svg)")
     args = parser.parse_args()
     given = Given(args.wheel, args.alks, args.openacc, shipped_folder("templates"), args.variants)
-    parts = args.part or ("alarms", "trained", "shortcut")
+    parts = args.part or ("alarms", "shortcut")
     with TemporaryDirectory() as name:
         folder = Path(name)
         if "alarms" in parts:
@@ -175,20 +155,8 @@ def main() -> None:
             rules = [rule() for rule in RULES.values()]
             every = [Pool.of(name, views, rules) for name, views in traffic.items()]
             show(default_lines(every), args.write, "defaults")
-            show(tuned_lines(every), args.write, "tuned")
             if args.figure is not None:
                 alarm_figure(alarms).save(args.figure)
-        if "trained" in parts:
-            scenes, rows = training(given, folder), dict[str, dict[str, list[str]]]()
-            runs = [scene for path in given.runs for scene in run_scenes(path)]
-            for word, sensor in (("perfect", PERFECT_SENSOR), ("usual", USUAL_SENSOR)):
-                detectors = {
-                    name: train((view for _, views in seen(each, sensor) for view in views), 0.5, name)
-                    for name, each in scenes.items()
-                }
-                held = seen(half_of(recorded(given.wheel), 1), sensor)
-                rows[word] = trained_cells(detectors, held, seen(runs, sensor))
-            show(trained_lines(rows), args.write, "trained")
         if "shortcut" in parts:
             scenarios = [given.templates / f"{name}.xosc" for name in ("cut-in", "dense-traffic")]
             scenarios += sorted(given.alks.glob("*_4_4_*.xosc")) + sorted(given.alks.glob("*_4_5_*.xosc"))

@@ -55,6 +55,7 @@ _HOME = {
     "ClosedLoop": "workflows.profiles.loop",
     "LoopPlan": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
+    "Sight": "workflows.detection.sight",
     "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -111,6 +112,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "ClosedLoop",
     "LoopPlan",
     "Detection",
+    "Sight",
     "ImportedDrives",
     "XoscLateralError",
     "FormatError",
@@ -140,6 +142,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
+    from xosc_lateral.workflows.detection.sight import Sight
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic

@@ -45,6 +45,10 @@ class Command(Detector):
         """See `Detector`."""
         return self.text
 
+    def title(self) -> str:
+        """See `Detector`."""
+        return self.text
+
     def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
         """See `Detector`."""
         scores = [np.zeros(len(view.track)) for view in views]

@@ -17,12 +17,14 @@ from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import Sensor
 from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.workflows.detection.sources import Source
+from xosc_lateral.workflows.detection.tuning import Carried, Goal, not_met
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
 
 HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
+TUNED_HEADINGS = ("source", "detector", "set on", "threshold", *HEADINGS[2:])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,6 +37,8 @@ class Detection(Result):
     seed: int
     still: frozenset[str]  # sources in which no vehicle moves inside its lane
     files: Sequence[Path]  # that must not be overwritten
+    goal: Goal | None = None  # what thresholds were set to; None: they are the detectors' own
+    homes: Sequence[Source] = ()  # on which they were set
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -48,12 +52,18 @@ class Detection(Result):
 
     def headline(self) -> str:
         """See `Result`."""
-        detectors = len(self.curves) // len(self.origins)
+        detectors = len({curve.detector.title() for curve in self.curves})
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        return f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+        what = f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+        return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """Of the table."""
+        return HEADINGS if self.goal is None else TUNED_HEADINGS
 
     def __str__(self) -> str:
-        lines = aligned([HEADINGS, *(cells(row) for row in self.rows())])
+        lines = aligned([self.headings, *(cells(row) for row in self.rows())])
         return "\n".join([self.headline(), "", *lines, "", *self.notes()])
 
     def notes(self) -> Sequence[str]:
@@ -63,6 +73,14 @@ class Detection(Result):
             "Seen: an alarm before the vehicle's reference point is in the other lane. Time: from the alarm to its "
             "side on the marking, median. Intervals: 95 %, by vehicles drawn anew."
         ]
+        if self.goal is not None:
+            lines.append(
+                f"Set on a home: the threshold that gives {self.goal.what} there; a source set on itself has, for each "
+                "vehicle, the threshold of other vehicles."
+            )
+            carriers = [one for tally in self.tallies if isinstance(one := tally.detector, Carried)]
+            if missed := not_met(carriers):
+                lines.append(f"No threshold gives that, the nearest is set: {', '.join(missed)}.")
         silent = sorted(self.still)
         if silent:
             lines.append(
@@ -98,6 +116,10 @@ class Detection(Result):
         return {
             "sources": [{"label": each.label, "files": [path.name for path in each.files]} for each in self.origins],
             "sensor": {"noise": self.sensor.noise, "delay": self.sensor.delay, "rate": self.sensor.rate},
+            **({} if self.goal is None else {
+                "goal": self.goal.text,
+                "homes": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.homes],
+            }),
             "rows": [_plain(row) for row in self.rows()],
             "curves": [
                 {
@@ -123,7 +145,7 @@ class Detection(Result):
 
     def provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
-        files = [path for source in self.origins for path in source.files if path.is_file()]
+        files = [path for source in (*self.origins, *self.homes) for path in source.files if path.is_file()]
         return {"seed": self.seed, "inputs": parsed_hashes(files)}
 
     def plot(self) -> Figure:
@@ -148,7 +170,7 @@ class Detection(Result):
         html = partial(
             detection_page,
             lead=[f"{self.headline()}.", *self.notes()],
-            table=[dict(zip(HEADINGS, cells(row), strict=True)) for row in self.rows()],
+            table=[dict(zip(self.headings, cells(row), strict=True)) for row in self.rows()],
             curves=self.curves,
             worst=self.worst(),
             provenance=self.provenance(),
@@ -161,6 +183,12 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
     in_time, medians = curve.seen_interval(in_time=True), curve.lead_interval()
     low, middle, high = (curve.lead(share) for share in (0.05, 0.5, 0.95))
     fixed: dict[str, Any] = {"source": curve.source, "detector": detector.label()}
+    if isinstance(detector, Carried):
+        home = detector.home
+        fixed |= {
+            "detector": detector.title(), "home": home.source, "home_met": home.met,
+            "home_false_alarms_per_hour": home.rate, "home_seen_before_marking": home.seen,
+        }  # fmt: skip
     counts = {"vehicles": len(curve.hours), "hours": float(curve.hours.sum()), "cut_ins": len(curve.leads)}
     rows = []
     for k in numbers:
@@ -199,7 +227,8 @@ def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     seen = _share(row, "seen", "seen_low", "seen_high")
     in_time = _share(row, "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high")
     lead = _with_interval(row, "lead_median", "lead_median_low", "lead_median_high", 2)
-    return str(row["source"]), str(row["detector"]), alarms, seen, in_time, lead
+    home = (str(row["home"]), f"{row['threshold']:.3g}") if "home" in row else ()
+    return str(row["source"]), str(row["detector"]), *home, alarms, seen, in_time, lead
 
 
 def _share(row: Mapping[str, Any], name: str, low: str, high: str) -> str:

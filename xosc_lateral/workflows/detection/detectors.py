@@ -34,6 +34,7 @@ class Detector(ABC):
     CURVE: ClassVar[FloatArray]  # thresholds that its curve is drawn over, besides the one that is set
 
     threshold: float  # that is set, in its own unit
+    home_source: str = ""  # on which the threshold was set
 
     @property
     def thresholds(self) -> FloatArray:
@@ -60,6 +61,18 @@ class Detector(ABC):
         """Name with its settings."""
         return self.name
 
+    def title(self) -> str:
+        """Name with its settings but the threshold."""
+        return self.name
+
+    def threshold_of(self, limit: float) -> float:
+        """A score as a threshold in its own unit."""
+        return limit if self.growing else -limit
+
+    def usable(self, views: Sequence[View]) -> Sequence[View]:
+        """Views that it can score."""
+        return [view for view in views if view.observer is not None] if self.needs_observer else views
+
 
 @dataclass(frozen=True)
 class Rule(Detector):
@@ -80,6 +93,11 @@ class Rule(Detector):
     def label(self) -> str:
         """See `Detector`."""
         return f"{self.name} ({', '.join(f'{one.name} {getattr(self, one.name):g}' for one in fields(self))})"
+
+    def title(self) -> str:
+        """See `Detector`."""
+        options = [f"{one.name} {getattr(self, one.name):g}" for one in fields(self) if one.name != "threshold"]
+        return f"{self.name} ({', '.join(options)})" if options else self.name
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.workflows.detection.detectors import Detector
 from xosc_lateral.workflows.detection.observation import View
+from xosc_lateral.workflows.detection.scoring import cut_ins_of
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
 
 FEATURES = ("position", "lateral speed", "lateral acceleration", "mean lateral speed", "movement", "unrest")
@@ -100,20 +101,29 @@ class Logistic(Detector):
         """See `Detector`."""
         return f"{self.name} (threshold {self.threshold:g})"
 
+    def threshold_of(self, limit: float) -> float:
+        """See `Detector`."""
+        return float(1.0 / (1.0 + np.exp(-limit)))
+
+
+def rows_to_train_on(view: View) -> tuple[IndexArray, BoolArray]:
+    """Rows of lane keeping and of lane changes until the marking is crossed, and which are which."""
+    keeping = view.truth.keeping & view.watched
+    changing = np.zeros(len(keeping), dtype=np.bool_)
+    for change in cut_ins_of(view):
+        changing[change.begin + 1 : change.crossing + 1] = True
+    rows = np.flatnonzero(keeping | changing)
+    rows = rows[rows % ROW_STRIDE == 0]
+    return rows, changing[rows]
+
 
 def training_rows(views: Iterable[View]) -> tuple[FloatArray, BoolArray]:
-    """Features of lane keeping and of lane changes until the marking is crossed, shape (n, 6), and which are which."""
+    """Features of rows that are trained on, shape (n, 6), and which are of lane changes."""
     columns, positive = [], []
     for view in views:
-        keeping = view.truth.keeping & view.watched
-        changing = np.zeros(len(keeping), dtype=np.bool_)
-        for change in view.truth.changes:
-            if change.side == view.side and view.watched[change.begin]:
-                changing[change.begin + 1 : change.crossing + 1] = True
-        rows = np.flatnonzero(keeping | changing)
-        rows = rows[rows % ROW_STRIDE == 0]
+        rows, changing = rows_to_train_on(view)
         columns.append(features(view)[rows])
-        positive.append(changing[rows])
+        positive.append(changing)
     if not columns:
         return np.zeros((0, len(FEATURES))), np.zeros(0, dtype=np.bool_)
     return np.concatenate(columns), np.concatenate(positive)

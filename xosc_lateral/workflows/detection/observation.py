@@ -9,6 +9,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.model.seeds import of_name
+from xosc_lateral.workflows.detection.band import Band
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, Truth, truth_of
 
 RATE_WINDOW = 0.5
@@ -34,6 +35,7 @@ class Sensor:
     noise: float = 0.0  # standard deviation of each measured position, white [m]
     delay: float = 0.0  # until it is known [s]
     rate: float = 1.0 / STEP  # positions a second, held in between [Hz]
+    band: Band | None = None  # through which positions are seen; None: all that there is
 
     def taken(self, first: int, n: int) -> IntArray:
         """Row that is known at each of n rows from instant number `first` on; -1 before the first one. Shape (n,)."""
@@ -51,7 +53,8 @@ def read_sensor(text: str) -> Sensor:
     if text == "usual":
         return USUAL_SENSOR
     limits = {"noise": (0.0, 2.0), "delay": (0.0, 5.0), "rate": (0.5, 1.0 / STEP)}
-    return Sensor(**read_numbers(text, limits, "a sensor"))
+    numbers = read_numbers(text, limits, "a sensor")
+    return Sensor(numbers.get("noise", 0.0), numbers.get("delay", 0.0), numbers.get("rate", 1.0 / STEP))
 
 
 def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str) -> dict[str, float]:
@@ -84,7 +87,7 @@ class Measured:
 def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measured:
     """What a sensor gives of a track."""
     taken = np.maximum(sensor.taken(track.first, len(track)), 0)
-    position = track.lateral
+    position = track.lateral if sensor.band is None else sensor.band.seen(track.lateral)
     if sensor.noise > 0.0:
         position = position + sensor.noise * rng.standard_normal(len(track))
     lateral = position[taken]

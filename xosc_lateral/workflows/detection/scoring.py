@@ -59,23 +59,25 @@ class Tally:
 
     def add(self, scene: Scene, views: Sequence[View]) -> None:
         """Run the detector on a scene."""
-        limits = self.detector.limits
-        if self.detector.needs_observer:
-            views = [view for view in views if view.observer is not None]
+        views = self.detector.usable(views)
         for view, score in zip(views, self.detector.scores(scene, views), strict=True):
-            watched = np.where(view.watched, score, NO_DANGER)
-            keeping = view.truth.keeping & view.watched
-            cluster = view.track.cluster
-            self.seconds[cluster] = self.seconds.get(cluster, 0.0) + float(keeping.sum()) * STEP
-            before = self.counts.get(cluster, np.zeros(len(limits), dtype=np.int64))
-            self.counts[cluster] = before + count_onsets(watched, keeping, limits)
-            self._add_false_alarm(scene, view, watched, keeping)
-            for change in view.truth.changes:
-                if change.side == view.side and view.watched[change.begin]:
-                    lead = lead_times(watched, change, limits)
-                    self.change_clusters.append(cluster)
-                    self.leads.append(lead)
-                    self._add_late_change(scene, view, watched, change, float(lead[self.detector.chosen]))
+            self.count(scene, view, score)
+
+    def count(self, scene: Scene, view: View, score: FloatArray) -> None:
+        """Add what the detector scores in a view, shape (n,)."""
+        limits = self.detector.limits
+        watched = np.where(view.watched, score, NO_DANGER)
+        keeping = view.truth.keeping & view.watched
+        cluster = view.track.cluster
+        self.seconds[cluster] = self.seconds.get(cluster, 0.0) + float(keeping.sum()) * STEP
+        before = self.counts.get(cluster, np.zeros(len(limits), dtype=np.int64))
+        self.counts[cluster] = before + count_onsets(watched, keeping, limits)
+        self._add_false_alarm(scene, view, watched, keeping)
+        for change in cut_ins_of(view):
+            lead = lead_times(watched, change, limits)
+            self.change_clusters.append(cluster)
+            self.leads.append(lead)
+            self._add_late_change(scene, view, watched, change, float(lead[self.detector.chosen]))
 
     def _add_false_alarm(self, scene: Scene, view: View, score: FloatArray, keeping: BoolArray) -> None:
         limit = float(self.detector.limits[self.detector.chosen])
@@ -113,6 +115,11 @@ class Tally:
             np.array([rows[name] for name in self.change_clusters], dtype=np.int64),
             np.array(self.leads).reshape(len(self.leads), m),
         )
+
+
+def cut_ins_of(view: View) -> list[LaneChange]:
+    """Lane changes into the lane that the vehicle is seen from, watched from their beginning."""
+    return [change for change in view.truth.changes if change.side == view.side and view.watched[change.begin]]
 
 
 def count_onsets(score: FloatArray, keeping: BoolArray, limits: FloatArray) -> IntArray:
@@ -224,6 +231,11 @@ class Curve:
         """Number of the most sensitive threshold with at most so many false alarms an hour."""
         fine = np.flatnonzero(self.sensitive_rate() <= rate)
         return int(fine[0]) if len(fine) else len(self.rate) - 1
+
+    def seeing(self, share: float) -> int:
+        """Number of the least sensitive threshold at which such a share of cut-ins is seen before the marking."""
+        enough = np.flatnonzero(self.in_time >= share)
+        return int(enough[-1]) if len(enough) else 0
 
 
 def _quantile(values: FloatArray, share: float) -> float:

@@ -42,6 +42,10 @@ class Source:
     scenes: Callable[[], Iterator[Scene]]
     files: tuple[Path, ...] = ()
 
+    def is_same(self, other: Source) -> bool:
+        """Whether both are the same scenes."""
+        return self.label == other.label and {*map(Path.resolve, self.files)} == {*map(Path.resolve, other.files)}
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SourceSettings:
