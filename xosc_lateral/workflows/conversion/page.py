@@ -57,7 +57,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
         f"The result is in `{(conversion.output or conversion.source).name}`."
     )
-    page.key_figures(_key_figures(enriched, done))
+    page.key_figures(key_figures(enriched, done))
     page.lead(conversion.under_test)
     for warning in conversion.warnings:
         page.warning(warning)
@@ -281,7 +281,8 @@ def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
     )
 
 
-def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
+def key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
+    """Numbers that a reader takes home, of the nominal run."""
     if not done:
         return []
     offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])

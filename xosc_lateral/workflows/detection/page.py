@@ -37,8 +37,8 @@ def detection_page(
         page.section("Finding")
         page.figure(
             alarms_figure(telling),
-            f"False alarms an hour over the threshold; none at all is drawn at {LEAST_RATE:g}. The dot is the threshold "
-            "that is set.",
+            f"False alarms an hour over the threshold; none at all is drawn at {LEAST_RATE:g}. The dot is the one that "
+            "is set.",
         )
     page.section("Table")
     page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
