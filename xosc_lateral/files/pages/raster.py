@@ -89,14 +89,14 @@ def _legend_rows(figure: Figure) -> list[tuple[Mark, str, float, int]]:
     if not figure.legend:
         return []
     keys = {mark.label: mark for panel in figure.panels for mark in panel.marks if mark.label}
-    found, x, row = list[tuple[Mark, str, float, int]](), EDGE, 0
+    placed, x, row = list[tuple[Mark, str, float, int]](), EDGE, 0
     for label, mark in keys.items():
         needed = text_width(label) + 34.0
         if x + needed > figure.width and x > EDGE:
             x, row = EDGE, row + 1
-        found.append((mark, label, x, row))
+        placed.append((mark, label, x, row))
         x += needed
-    return found
+    return placed
 
 
 def _draw_legend(draw: ImageDraw, rows: list[tuple[Mark, str, float, int]], scale: float) -> None:

@@ -241,9 +241,9 @@ class Kept:
     def moving(self) -> dict[str, tuple[float, str]]:
         """The least share of its driving time in which each entity moves sideways [-], and the run in which it is."""
         least: dict[str, tuple[float, str]] = {}
-        for one in self.comparisons:
-            for name, share in one.moving.items():
-                here = 1.0 if share is None else share, one.run
+        for comparison in self.comparisons:
+            for name, share in comparison.moving.items():
+                here = 1.0 if share is None else share, comparison.run
                 least[name] = min(least.get(name, here), here, key=lambda each: each[0])
         return least
 
@@ -253,10 +253,10 @@ class Kept:
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
         return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
 
-    def warnings(self, unmoved: Collection[str], told: Collection[tuple[str, str]] = ()) -> Iterator[str]:
+    def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[str]:
         """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
 
-        `told`: contacts in the nominal run that others tell of
+        `known`: contacts in the nominal run that others tell of
         """
         for name in sorted(unmoved & self.smaller.keys()):
             yield f"'{name}' stays as it is: {CHANGES}"
@@ -269,19 +269,19 @@ class Kept:
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
                 yield f"'{name}' {moves} (run: {run})"
-        said = set[tuple[str, str | None]]()
+        listed = set[tuple[str, str | None]]()
         for shift in self.shifts:
             longer = shift.end - shift.start
             is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE
             is_long = is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration
-            if is_long and (shift.event, shift.entity) not in said:
-                said.add((shift.event, shift.entity))
+            if is_long and (shift.event, shift.entity) not in listed:
+                listed.add((shift.event, shift.entity))
                 yield (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
                     f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
                     f"is another one (run: {shift.run})"
                 )
-        yield from (str(one) for one in self.changes if one.run != NOMINAL_RUN or one.pair not in told)
+        yield from (str(one) for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
 
 
 def keep_meaning(

@@ -45,12 +45,12 @@ def summary_of(conversion: ConvertedScenario, path: Path) -> dict[Path, str]:
         "| entity | written as | profile | offsets, std. deviation |",
         "|---|---|---|---|",
     ]
-    for one in enriched.entities:
-        if one.is_enriched and one.profile is not None:
-            mode = made.modes.get(one.name, "")
-            cells = (one.name, MODE_WORDS.get(mode, mode), one.profile.name, f"{one.offset_spread:.2f} m")
+    for entity in enriched.entities:
+        if entity.is_enriched and entity.profile is not None:
+            mode = made.modes.get(entity.name, "")
+            cells = (entity.name, MODE_WORDS.get(mode, mode), entity.profile.name, f"{entity.offset_spread:.2f} m")
         else:
-            cells = (one.name, f"as it was: {one.why}", "", "")
+            cells = (entity.name, f"as it was: {entity.why}", "", "")
         lines.append(f"| {' | '.join(map(_cell, cells))} |")
     if conversion.warnings:
         lines += ["", *(f"- :warning: {_cell(warning)}" for warning in conversion.warnings)]

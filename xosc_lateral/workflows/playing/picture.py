@@ -20,7 +20,7 @@ IMAGE_SUFFIXES, ANIMATION_SUFFIXES = (".svg", ".png"), (".gif",)
 
 REACH = 70.0
 """Road that is shown before and behind the vehicle that is looked at. [m]"""
-FAR = 400.0
+DRAWN_REACH = 400.0
 """Farther away nothing is drawn: pieces of lanes are 200 m long. [m]"""
 DASH, PERIOD = 6.0, 18.0
 """Of a broken marking. [m]"""
@@ -65,15 +65,18 @@ class Scene:
         x, y, _ = self._pose(followed, "nominal", time)
         camera = x, y, float(self._at(followed, followed["course"], time))
         self._draw_road(panel, camera)
-        for one in shown:
-            path = "enriched" if "enriched" in one else "nominal"
-            outline = _seen(_outline(one, self._pose(one, path, time)), camera)
+        for vehicle in shown:
+            path = "enriched" if "enriched" in vehicle else "nominal"
+            outline = _seen(_outline(vehicle, self._pose(vehicle, path, time)), camera)
             is_near = bool((np.abs(outline[:, 0]) < REACH).any())
             panel.area(
-                outline[:, 0], outline[:, 1], color_of(one["number"]), label=label_of(one["name"]) if is_near else ""
+                outline[:, 0],
+                outline[:, 1],
+                color_of(vehicle["number"]),
+                label=label_of(vehicle["name"]) if is_near else "",
             )
             if path == "enriched" and is_near:
-                around = _seen(_outline(one, self._pose(one, "nominal", time)), camera)
+                around = _seen(_outline(vehicle, self._pose(vehicle, "nominal", time)), camera)
                 ghost = np.vstack([around, around[:1]])
                 panel.line(ghost[:, 0], ghost[:, 1], INK, width=1.0, dashes="3 2", label="without offsets")
         return figure
@@ -81,11 +84,11 @@ class Scene:
     def _draw_road(self, panel: Panel, camera: tuple[float, float, float]) -> None:
         for kind, places in self._lanes:
             seen = _seen(places, camera)
-            if np.hypot(*seen.T).min() < FAR:
+            if np.hypot(*seen.T).min() < DRAWN_REACH:
                 panel.area(seen[:, 0], seen[:, 1], ASPHALT if kind == "driving" else VERGE)
         for mark, places in self._marks:
             seen = _seen(places, camera)
-            if np.hypot(*seen.T).min() < FAR and len(seen) > 1:
+            if np.hypot(*seen.T).min() < DRAWN_REACH and len(seen) > 1:
                 for part in _strokes(seen, mark["start"]) if "broken" in mark["type"] else [seen]:
                     panel.line(part[:, 0], part[:, 1], YELLOW if mark["color"] == "yellow" else PAINT, width=1.6)
 
@@ -203,9 +206,9 @@ def write_animation(
     from PIL import Image
 
     frames = []
-    for one in images:  # legends may have more or fewer rows
+    for image in images:  # legends may have more or fewer rows
         frame = Image.new("RGB", size, "white")
-        frame.paste(one, (0, size[1] - one.height))
+        frame.paste(image, (0, size[1] - image.height))
         frames.append(frame.quantize(64, dither=Image.Dither.NONE))
     data = BytesIO()
     more = {
