@@ -55,6 +55,8 @@ def convert(
     settings: Annotated[Options, ConvertSettings],
     batch: Annotated[Options, xl.convert_many],
     osi: Osi = None,
+    summary: Annotated[str | None, typer.Option(metavar="FILE.md",
+        help="Markdown with the numbers and two pictures, for a pull request.")] = None,
     log_json: Annotated[bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.",
         rich_help_panel="Batches")] = False,
     reply: Written,
@@ -67,10 +69,11 @@ def convert(
     report = batch.get("report")
     if len(scenario) == 1 and is_single(scenario[0]):
         limits = {"timeout": batch["job_timeout"], "memory": batch["job_memory"]}
-        _convert_one(Path(scenario[0]), output, options, limits, batch["variants"], report, osi, reply)
+        _convert_one(Path(scenario[0]), output, options, limits, batch["variants"], report, osi, summary, reply)
         return
-    if osi is not None:
-        raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
+    for option, stated in (("--osi", osi), ("--summary", summary)):
+        if stated is not None:
+            raise typer.BadParameter("is written for a single scenario", param_hint=option)
     if report is not None and Path(report).is_file():
         raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
     options |= {**batch, "show": "json" if log_json else "quiet" if reply.quiet else "auto"}
@@ -95,7 +98,7 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 def _convert_one(
     source: Path, output: str | None, options: dict[str, Any], limits: Mapping[str, float], variants: int,
-    report: str | None, osi: str | None, reply: Written,
+    report: str | None, osi: str | None, summary: str | None, reply: Written,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
@@ -103,6 +106,7 @@ def _convert_one(
     from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
+    from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     def limited(target: Path | None, **more: Any) -> Conversion:
@@ -112,7 +116,7 @@ def _convert_one(
             raise JobLimitError(f"{source}: {error}") from error
 
     if output == STDOUT:
-        if variants > 1 or reply.as_json or osi is not None:
+        if variants > 1 or reply.as_json or osi is not None or summary is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = limited(None, report=report)
         write_stdout(result.data)
@@ -123,20 +127,24 @@ def _convert_one(
         written = default_output(source) if output is None else output_scenario(output, source)
         page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         trace = None if osi is None else osi_files(osi, source)[0]
+        words = None if summary is None else output_file(summary, f"{written.stem}.md", SUMMARY_SUFFIXES)
         files = [
-            [None if path is None else numbered(path, variant, variants) for path in (written, page, trace)]
+            [None if path is None else numbered(path, variant, variants) for path in (written, page, trace, words)]
             for variant in range(variants)
         ]
         osi_wanted(trace)
-        outputs, pages, traces = zip(*files, strict=True)
+        outputs, pages, traces, summaries = zip(*files, strict=True)
         both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        both += [path for one in summaries if one is not None for path in (one, *pictures_beside(one))]
         claim([*outputs, *pages, *both], [source], force=reply.force)
         unclean = False
-        for variant, (path, its_page, its_trace) in enumerate(files, start=1):
+        for variant, (path, its_page, its_trace, its_summary) in enumerate(files, start=1):
             with together():
                 result = limited(path, variant=variant, report=its_page)
                 if its_trace is not None:
                     result.write_osi(its_trace, force=True)
+                if its_summary is not None:
+                    result.write_summary(its_summary, force=True)
             reply.say(result)
             _warn_if_cut_off(result, reply.quiet or reply.as_json)
             unclean |= bool(result.warnings) or not result.enriched

@@ -19,12 +19,14 @@ from xosc_lateral.cli.words import (
     Verbose,
     Written,
     command,
+    naming_option,
     pairs,
     say,
     say_json,
     warn,
     write_stdout,
 )
+from xosc_lateral.files.source import changes
 
 # What is said of one option stays together.
 # fmt: off
@@ -87,25 +89,53 @@ def segments(
 
 @command(
     app, "view", VERBS["view"],
-    "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/",
+    "view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc --image moment.svg --at 8.5",
 )
 def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)], *,
     output: Annotated[str | None, typer.Option("--output", "-o",
-        help="Page to write; default: NAME_view.html beside it.")] = None,
+        help="Page to write; default: NAME_view.html beside it, unless a picture is asked for.")] = None,
+    image: Annotated[str | None, typer.Option(metavar="FILE.svg|.png",
+        help="Picture of a moment; PNG: extra pictures.")] = None,
+    at: Annotated[float | None, typer.Option(help="Its time [s]; default: half of the run.", min=0.0)] = None,
+    animation: Annotated[str | None, typer.Option(metavar="FILE.gif", help="The run; extra pictures.")] = None,
+    watch: Annotated[bool, typer.Option("--watch", help="Write again whenever a file that is read changes.")] = False,
     options: Annotated[Options, xl.segments],
     open_page: Annotated[bool | None, typer.Option("--open/--no-open",
         help="Open the page in the browser. Default: from a terminal.")] = None,
     force: Force = False, quiet: Quiet = False, verbose: Verbose = False,
 ) -> None:
     """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
-    played = xl.play(scenario, **options)
-    page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
-    warn(played.warnings)
-    if not quiet:
-        say(str(page))
-    if open_page or (open_page is None and sys.stdout.isatty()):
+    from xosc_lateral.files.atomic import together
+
+    if at is not None and image is None:
+        raise typer.BadParameter("is the time of a picture, see --image", param_hint="--at")
+    usual = None if image or animation else scenario.with_name(f"{scenario.stem}_view.html")
+
+    def write(force: bool) -> tuple[xl.Playback, Path | None]:
+        played = xl.play(scenario, **options)
+        page = output or usual
+        with together():
+            written = [None if page is None else played.write_page(page, force=force)]
+            with naming_option("--at"):
+                written += [] if image is None else [played.write_image(image, at, force=force)]
+            with naming_option("--animation"):
+                written += [] if animation is None else [played.write_animation(animation, force=force)]
+        warn(played.warnings)
+        for path in written if not quiet else ():
+            if path is not None:
+                say(path)
+        return played, written[0]
+
+    played, page = write(force)
+    if page is not None and (open_page or (open_page is None and sys.stdout.isatty())):
         typer.launch(page.absolute().as_uri())
+    if watch:
+        for _ in changes(played.files):
+            try:
+                write(True)
+            except xl.XoscLateralError as error:  # a file that is being edited may be broken for a while
+                say(error, err=True)
 
 
 group = typer.Typer(help="Maneuver-based motorway scenarios to start from.", no_args_is_help=True)

@@ -116,6 +116,7 @@ def numbered(path: Path, variant_index: int, variants: int) -> Path:
 # ---- whether a file is one that this package wrote: each format says so in its own place
 SIDECAR_SUFFIX = ".json"  # beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers
 PACKAGE = b"xosc-lateral"
+MARKDOWN_MARK, SVG_MARK = "<!-- made by xosc-lateral -->", "<metadata>xosc-lateral</metadata>"
 _HEAD = 65_536  # the mark of a file of ours stands this near to its beginning [byte]
 
 
@@ -176,6 +177,10 @@ _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".json": _own_json,
     ".parquet": _own_parquet,
     ".html": lambda path: b'content="xosc-lateral ' in _head(path),
+    ".md": lambda path: MARKDOWN_MARK.encode() in _head(path),
+    ".svg": lambda path: SVG_MARK.encode() in _head(path),
+    ".png": lambda path: PACKAGE in _head(path),
+    ".gif": lambda path: PACKAGE in _head(path),
     ".mcap": lambda path: PACKAGE in _head(path),  # its header and metadata are not compressed
 }
 

@@ -15,6 +15,7 @@ import hashlib
 import io
 import os
 import stat
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -260,3 +261,23 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
 def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+WATCH_TIME = 0.5
+"""Between two looks at files that are watched. [s]"""
+
+
+def changes(paths: Iterable[Path]) -> Iterator[None]:
+    """Wait, for ever: yields whenever one of the files is another one than before. One that is gone is waited for."""
+    watched = list(paths)
+
+    def states() -> list[str]:
+        return [file_state(path) for path in watched]
+
+    before = states()
+    while True:
+        time.sleep(WATCH_TIME)
+        now = states()
+        if now != before:
+            before = now
+            yield

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -37,6 +38,12 @@ class Result(ABC):
 
     @abstractmethod
     def __str__(self) -> str: ...
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the text, and the figure of a result that has one."""
+        plot = getattr(self, "plot", None)
+        figure = None if plot is None else plot()
+        return f"<pre>{escape(str(self))}</pre>{'' if figure is None else figure.svg()}"
 
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:

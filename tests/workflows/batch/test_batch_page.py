@@ -46,6 +46,11 @@ def test_the_lead_and_the_tiles_count_what_is_listed(page):
     assert page.count("<td>failed</td>") == 1 and page.count("<td>new contact</td>") == 1
 
 
+def test_contacts_under_other_egos_are_counted_apart():
+    page = batch_page([CALM, replace(CALM, output="tried.xosc", trial_contacts=2)], {}, "out")
+    assert re.search(r"<dt>with new contacts</dt><dd>0</dd><dd[^>]*>[^<]*; 1 more only with an ego that drives", page)
+
+
 def test_causes_are_alike_but_for_files_names_and_numbers():
     said = [(replace(CALM, output=f"{k}.xosc"), f"a/{k}.xosc:{k}: no entity 'X{k}' at {k}.5 s") for k in range(3)]
     said += [(CALM, "calm.xosc: the file is empty")] * 2

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -83,6 +85,30 @@ def test_the_same_inputs_and_seed_give_the_same_bytes(folder):
         assert main(["detect", *words.split()]) == 0
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
     assert Path("a.html").read_bytes() == Path("b.html").read_bytes()
+
+
+def test_the_page_opens_with_what_the_table_says(folder):
+    """The finding's numbers are cells of the table; the colour of a vehicle is that of its place in the scenario."""
+    found = xl.detect("cut-in.xosc", ego="none", variants=2)
+    found.write_report("finding.html")
+    page = Path("finding.html").read_text()
+    lead, main = page.split("<main>")
+    (sentence,) = re.findall(r"<p>([^<]+ raises false alarms an hour: [^<]+)</p>", lead)
+    label = sentence.split(" raises false alarms")[0]
+    rows = [row for row in found.rows() if escape(row["detector"]) == label]
+    assert len(rows) == 2
+    for row in rows:
+        assert f"{row['false_alarms_per_hour']:.1f} on {escape(row['source'])}" in sentence
+    every = {row["detector"] for row in found.rows()}
+    spread = {
+        name: np.ptp([row["false_alarms_per_hour"] for row in found.rows() if row["detector"] == name])
+        for name in every
+    }
+    assert spread[rows[0]["detector"]] == max(spread.values()) > 0.0
+    assert main.index("<svg") < main.index("<table"), "the picture comes first"
+    order = [entity.name for entity in play_scenario(Path("cut-in.xosc")).motion.entities]
+    scene = json.loads(page.split('id="scene-1">')[1].split("</script>")[0])
+    assert all(one["number"] == order.index(one["name"]) for one in scene["entities"])
 
 
 def test_the_page_plays_its_worst_cases(folder):

@@ -120,6 +120,17 @@ def test_who_is_added_again_begins_anew_in_the_middle_of_its_lane() -> None:
     assert abs(traffic.moves["Truck"][0]) < 0.3
 
 
+def test_an_ego_by_its_name_is_not_driven_which_is_said_and_none_drives_it():
+    run = live_esmini(CUT_IN, StandIn(), seed=3, duration=1.0, step=0.1)
+    assert [note for note in run.notes if "'Ego'" in note] == [
+        "not driven, it is under test by its name (--ego none drives everybody): 'Ego'"
+    ]
+    frame = run.to_frame()
+    assert not frame[frame.name == "Ego"].steered.any() and frame[frame.name == "CutIn"].steered.any()
+    everybody = live_esmini(CUT_IN, StandIn(), ego=["none"], seed=3, duration=1.0, step=0.1).to_frame()
+    assert everybody[everybody.name == "Ego"].steered.any()
+
+
 def test_an_ego_that_nobody_drives_and_names_that_nobody_has_are_said() -> None:
     player = StandIn()
     player.broken["Ego"] = {"ctrl_type": 1, "x": 5.0, "y": 1.0}

@@ -18,6 +18,7 @@ from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import sealed
 from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, Moves
 from xosc_lateral.workflows.live.traffic import FORMAT, Moment, Traffic
+from xosc_lateral.workflows.live.under_test import UnderTest
 from xosc_lateral.workflows.profiles.profiles import read_profile
 
 DT = 0.01
@@ -243,3 +244,26 @@ def test_on_the_other_side_of_the_road_he_does_the_mirror_image(profile: DriverP
     right = column(drive(Traffic(profile, seed=3), 3.0), "offset")
     left = column(drive(Traffic(profile, seed=3, left_hand=True), 3.0), "offset")
     np.testing.assert_allclose(left, -right, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("stated", "driven", "name", "is_under_test"),
+    [
+        (None, (), "Ego", True),
+        (None, (), "hero_2", True),
+        (None, (), "Egon", False),
+        (None, ("Ego",), "Ego", False),  # --vehicle Ego=PROFILE
+        ("none", (), "Ego", False),
+        (["none"], (), "Ego", False),
+        ((), (), "Ego", False),
+        (["Truck"], (), "Ego", False),
+        ("Truck", (), "Truck", True),
+    ],
+)
+def test_who_is_called_like_an_ego_is_under_test_unless_said_otherwise(stated, driven, name, is_under_test):
+    assert (name in UnderTest(stated, driven)) == is_under_test
+
+
+def test_others_beside_none_are_refused():
+    with pytest.raises(ValueError, match="stands alone"):
+        UnderTest(["none", "Ego"])

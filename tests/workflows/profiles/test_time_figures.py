@@ -65,7 +65,7 @@ def test_speeds_are_drawn_nominal_and_enriched_in_the_entity_s_colour(enriched: 
 def test_accelerations_are_what_was_added_between_the_bounds_of_real_drivers(enriched: Enriched) -> None:
     panels = accelerations_over_time(enriched, enriched.entities).panels
     for number, (panel, one) in enumerate(zip(panels, enriched.entities, strict=True)):
-        np.testing.assert_allclose(lines(panel)["added"][:, 1], one.lateral_acceleration()[shown_rows(one.motion)])
+        np.testing.assert_allclose(lines(panel)["added"][:, 1], one.lateral_acceleration())
         levels = {float(mark.y[0]) for mark in panel.marks if mark.dashes}
         assert levels == {-USUAL_ACCELERATION, USUAL_ACCELERATION}
         assert [mark.color for mark in panel.marks if mark.label == "added"] == [color_of(number)]

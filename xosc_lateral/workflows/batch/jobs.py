@@ -300,6 +300,7 @@ def _described(job: Job, conversion: Conversion) -> ManifestRow:
         offset_spread=_rounded(np.std(np.concatenate(offsets))) if offsets else 0.0,
         gap_before=before,
         gap_after=after,
+        trial_contacts=len(conversion.trial_contacts),
         warnings=conversion.warnings,
         version=provenance.version,
         mode=provenance.mode,

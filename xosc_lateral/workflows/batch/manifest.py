@@ -74,6 +74,7 @@ class ManifestRow:
     offset_spread: float = 0.0
     gap_before: float | None = None
     gap_after: float | None = None
+    trial_contacts: int = 0
     warnings: tuple[str, ...] = ()
     player: str = "standard"
     version: str = ""
@@ -128,7 +129,7 @@ def manifest_schema() -> pa.Schema:
     import pyarrow as pa
 
     types: dict[str, pa.DataType] = dict.fromkeys(("stale", "with_sensor", "cut_off"), pa.bool_())
-    types |= dict.fromkeys(("variant", "seed", "entities", "behaviour", "schema"), pa.int64())
+    types |= dict.fromkeys(("variant", "seed", "entities", "trial_contacts", "behaviour", "schema"), pa.int64())
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
     types |= dict.fromkeys(("enriched", "warnings", "only", "ego"), pa.list_(pa.string()))
     return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])

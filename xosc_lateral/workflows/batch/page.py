@@ -37,6 +37,7 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
     """HTML index of a batch; same rows, same bytes. `links`: output -> its page; `name`: of the output folder."""
     failed = by_cause((row, row.error) for row in rows if row.error)
     contacts = [row for row in rows if _has_new_contact(row)]
+    in_trials = [row for row in rows if row.trial_contacts and not row.error and row not in contacts]
     warned = by_cause((row, warning) for row in rows if not row.error for warning in row.warnings)
     lost, causes = sum(bool(row.error) for row in rows), f"{len(failed)} cause{'s' if len(failed) != 1 else ''}"
     page = Page(f"Batch {name}")
@@ -50,7 +51,8 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
             KeyFigure(len(rows) - lost, "outputs"),
             KeyFigure(lost, "failed", tone="bad" if lost else ""),
             KeyFigure(
-                len(contacts), "with new contacts", "in the nominal run, where the maneuvers alone have none",
+                len(contacts), "with new contacts", "in the nominal run, where the maneuvers alone have none"
+                + (f"; {len(in_trials)} more only with an ego that drives otherwise" if in_trials else ""),
                 "bad" if contacts else "",
             ),
             KeyFigure(sum(bool(row.warnings) for row in rows), "with warnings"),

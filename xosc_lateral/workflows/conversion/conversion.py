@@ -170,6 +170,26 @@ class Conversion(ConvertedScenario, Result):
             write_osi(nominal, made.motion, made.network, host=host, description=nominal_words)
         return outputs
 
+    def write_image(self, path: PathLike, at: float | None = None, *, force: bool = False) -> Path:
+        """Write a moment from above, dashed as written, as ``.svg`` or ``.png`` (extra `pictures`); `at`: half. [s]"""
+        from xosc_lateral.workflows.playing.picture import write_image
+        from xosc_lateral.workflows.playing.scene import scene_of
+
+        scene = scene_of(self.movement.motion, self.movement.network, self.movement.entities)
+        return write_image(scene, path, at, usual_name=self.source.stem, inputs=[self.source], force=force)
+
+    def write_summary(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write Markdown with the numbers, and beside it the two pictures that it shows."""
+        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside, summary_of
+
+        output = output_file(path, f"{(self.output or self.source).stem}.md", SUMMARY_SUFFIXES)
+        claim([output, *pictures_beside(output)], [self.source], force=force)
+        with together():
+            for file, text in summary_of(self, output).items():
+                write_atomically(file, text)
+        return output
+
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page about what was changed."""
         from xosc_lateral.workflows.conversion.page import conversion_page

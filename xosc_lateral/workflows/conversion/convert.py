@@ -191,7 +191,8 @@ def check(plan: Plan, written: Written) -> Written:
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    return replace(best, movement=movement, shifts=kept.shifts, warnings=tuple(kept.warnings(unmoved)))
+    warnings = tuple(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    return replace(best, movement=movement, shifts=kept.shifts, warnings=warnings, trial_contacts=kept.trial_contacts)
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:
@@ -222,6 +223,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         content=file.data,
         is_replay=plan.is_replay,
         shifts=written.shifts,
+        trial_contacts=written.trial_contacts,
         controllers=plan.controllers,
         egos=plan.egos,
     )

@@ -20,7 +20,7 @@ from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_gr
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, EventShift, untouched
+from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, EventShift, untouched
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
@@ -98,6 +98,9 @@ Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
 
 
+OTHER_RUNS = ("ego at 0.8 times its speed", "ego at 1.2 times its speed", "ego that brakes to a stop")  # of `_drives`
+
+
 def _drives(speed: float) -> tuple[Speeds, ...]:
     """Ways to drive, beside the nominal one: slower, faster, to a stop and on."""
     stopped = BRAKING_START + speed / BRAKING_RATE + STANDING_TIME
@@ -158,7 +161,7 @@ class Meaning:
         """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         comparisons, after = [], [run for _, run in self._runs(scenario)]
-        for (driven, before), run in zip(self._before, after, strict=True):
+        for (driven, before), run, name in zip(self._before, after, (NOMINAL_RUN, *OTHER_RUNS), strict=False):
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
@@ -169,7 +172,9 @@ class Meaning:
                 found = structs.replace(found, changes=tuple(others))
             movement = changed_movement(network, before, run, moved)
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
-            comparisons.append(structs.replace(found, changes=(*found.changes, *movement), moving=shares))
+            changes = tuple(structs.replace(one, run=name) for one in (*found.changes, *movement))
+            shifts = tuple(structs.replace(one, run=name) for one in found.shifts)
+            comparisons.append(Comparison(shifts, changes, shares, name))
         return comparisons, after[0]
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
@@ -229,19 +234,30 @@ class Kept:
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
-        """The largest of each event."""
+        """The largest of each event in every run."""
         return largest_of(self.comparisons)
 
     @property
-    def moving(self) -> dict[str, float]:
-        """The least share of its driving time in which each entity moves sideways. [-]"""
-        least: dict[str, float] = {}
-        for name, share in (pair for one in self.comparisons for pair in one.moving.items()):
-            least[name] = min(least.get(name, 1.0), 1.0 if share is None else share)
+    def moving(self) -> dict[str, tuple[float, str]]:
+        """The least share of its driving time in which each entity moves sideways [-], and the run in which it is."""
+        least: dict[str, tuple[float, str]] = {}
+        for comparison in self.comparisons:
+            for name, share in comparison.moving.items():
+                here = 1.0 if share is None else share, comparison.run
+                least[name] = min(least.get(name, here), here, key=lambda each: each[0])
         return least
 
-    def warnings(self, unmoved: Collection[str]) -> Iterator[str]:
-        """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise."""
+    @property
+    def trial_contacts(self) -> tuple[str, ...]:
+        """New contacts that only come about under other egos, a line each."""
+        nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
+        return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
+
+    def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[str]:
+        """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
+
+        `known`: contacts in the nominal run that others tell of
+        """
         for name in sorted(unmoved & self.smaller.keys()):
             yield f"'{name}' stays as it is: {CHANGES}"
         for name, (factor, everywhere) in sorted(self.smaller.items()):
@@ -249,20 +265,23 @@ class Kept:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
                 yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
-        for name, share in sorted(self.moving.items()):
+        for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
-                yield f"'{name}' {moves}, in one of the runs that it was tried in"
+                yield f"'{name}' {moves} (run: {run})"
+        listed = set[tuple[str, str | None]]()
         for shift in self.shifts:
             longer = shift.end - shift.start
             is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE
-            if is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration:
+            is_long = is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration
+            if is_long and (shift.event, shift.entity) not in listed:
+                listed.add((shift.event, shift.entity))
                 yield (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
                     f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
-                    "is another one"
+                    f"is another one (run: {shift.run})"
                 )
-        yield from map(str, self.changes)
+        yield from (str(one) for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
 
 
 def keep_meaning(

@@ -8,7 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
-from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario, Enriched, EntityResult
+from xosc_lateral.workflows.conversion.result import (
+    MODE_WORDS,
+    NOMINAL_RUN,
+    ConvertedScenario,
+    Enriched,
+    EntityResult,
+)
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.workflows.playing.figures import USUAL_ACCELERATION, add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
@@ -50,7 +57,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
         f"The result is in `{(conversion.output or conversion.source).name}`."
     )
-    page.key_figures(_key_figures(enriched, done))
+    page.key_figures(key_figures(enriched, done))
     page.lead(conversion.under_test)
     for warning in conversion.warnings:
         page.warning(warning)
@@ -134,7 +141,8 @@ def _add_offsets(page: Page, enriched: Enriched, done: Sequence[EntityResult]) -
         page.table(
             [_entity_row(entity) for entity in done],
             "Enriched entities. Acceleration and jerk are lateral, and what enriching adds to the nominal path.",
-            formats={"time [s]": ".1f", f"> {USUAL_ACCELERATION} m/s² [%]": ".1f"},
+            formats=dict.fromkeys(("time [s]", f"> {USUAL_ACCELERATION} m/s² [%]"), ".1f")
+            | dict.fromkeys(("max. offset [m]", "acc. max. [m/s²]"), ".2f"),
         )
     others = [{"entity": one.name, "reason": one.why} for one in enriched.entities if not one.is_enriched]
     if others:
@@ -180,7 +188,7 @@ def _add_lane_changes(page: Page, enriched: Enriched, done: Sequence[EntityResul
 def _add_gaps(page: Page, enriched: Enriched) -> None:
     page.section(
         "Gaps",
-        "The smallest free space between the bounding boxes of two vehicles that come within "
+        "The smallest free space in the nominal run between the bounding boxes of two vehicles that come within "
         f"{MAXIMUM_GAP:g} m of each other.",
     )
     before = {gap.names: gap for gap in enriched.gaps_before}
@@ -199,7 +207,7 @@ def _add_gaps(page: Page, enriched: Enriched) -> None:
         for nominal, made in pairs
     ]
     if not pairs:
-        page.text("No two vehicles come that close to each other.")
+        page.text("No two vehicles come that close to each other there.")
     else:
         page.table(
             rows,
@@ -241,10 +249,16 @@ def _add_followings(page: Page, enriched: Enriched) -> None:
 
 def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
     """Events that come at other times with the offsets than without them."""
-    if not conversion.shifts:
+    shifts = [
+        one
+        for one in conversion.shifts
+        if one.run == NOMINAL_RUN or max(abs(one.start), abs(one.end)) > EVENT_TOLERANCE
+    ]
+    if not shifts:
         return
     rows = [
         {
+            "run": shift.run,
             "event": shift.event,
             "of": shift.entity or "",
             "at [s]": shift.time,
@@ -253,31 +267,31 @@ def _add_shifts(page: Page, conversion: ConvertedScenario) -> None:
             "ends later by [s]": shift.end,
             "lateral speed [m/s]": shift.lateral_speed,
         }
-        for shift in conversion.shifts
+        for shift in shifts
     ]
     page.heading("Events")
     page.table(
         rows,
-        "How much later events start and end with the offsets than without them (negative: earlier), the largest under "
-        "egos at 0.8, 1.0 and 1.2 of their initial speed and one that brakes to a stop. An action by an acceleration "
-        "or a rate takes longer or shorter from beside the middle; it begins without the lateral speed that a vehicle "
-        "comes with.",
+        "How much later events start and end with the offsets than without them (negative: earlier): all of the "
+        f"nominal run, which the page is about, and those of trial runs that move by more than {EVENT_TOLERANCE} s. An "
+        "action by an acceleration or a rate takes longer or shorter from beside the middle; it begins without the "
+        "lateral speed that a vehicle comes with.",
         formats=dict.fromkeys(("at [s]", "lasts [s]", "starts later by [s]", "ends later by [s]"), ".2f")
         | {"lateral speed [m/s]": ".3f"},
     )
 
 
-def _key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
+def key_figures(enriched: Enriched, done: Sequence[EntityResult]) -> list[KeyFigure]:
+    """Numbers that a reader takes home, of the nominal run."""
     if not done:
         return []
     offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])
     added = np.concatenate([np.abs(entity.lateral_acceleration()) for entity in done])
     rough = float(np.mean(added > USUAL_ACCELERATION))
+    largest = max(float(np.abs(entity.deviation).max()) for entity in done)
     figures_ = [
         KeyFigure(f"{sum(entity.segment_seconds for entity in done):.0f} s", "road-following, all entities together"),
-        KeyFigure(
-            f"{offsets.std():.2f} m", "standard deviation of the offsets", f"largest {np.abs(offsets).max():.2f} m"
-        ),
+        KeyFigure(f"{offsets.std():.2f} m", "standard deviation of the offsets", f"largest {largest:.2f} m"),
         KeyFigure(
             f"{added.max():.2f} m/s²",
             "largest added lateral acceleration",

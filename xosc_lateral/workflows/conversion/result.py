@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import Bound
@@ -40,6 +40,12 @@ class LaneChanges(StrEnum):
 
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""
+
+NOMINAL_RUN = "nominal"
+"""Name of the run in which vehicles under test drive as written; others are named by what theirs do."""
+
+ROW_STEP = 0.1
+"""Between rows that are drawn, and from which accelerations are taken. [s]"""
 
 MODE_WORDS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
 """Modes of vehicles in words."""
@@ -109,12 +115,19 @@ class EntityResult:
         return float(np.std(np.concatenate([segment.offset for segment in self.segments]))) if self.segments else 0.0
 
     def lateral_acceleration(self) -> FloatArray:
-        """Second time derivative of the deviation, shape (rows,): what enriching added. [m/s2]"""
-        return _derivative(_derivative(self.deviation, self.motion.time), self.motion.time)
+        """Second time derivative of the deviation, what enriching added, at `shown_rows`, shape (k,). [m/s2]"""
+        rows = shown_rows(self.motion)
+        return _derivative(_derivative(self.deviation[rows], self.motion.time[rows]), self.motion.time[rows])
 
     def lateral_jerk(self) -> FloatArray:
-        """Third time derivative of the deviation, shape (rows,). [m/s3]"""
-        return _derivative(self.lateral_acceleration(), self.motion.time)
+        """Third time derivative of the deviation, at `shown_rows`, shape (k,). [m/s3]"""
+        return _derivative(self.lateral_acceleration(), self.motion.time[shown_rows(self.motion)])
+
+
+def shown_rows(motion: EntityMotion) -> IntArray:
+    """Rows that are drawn, `ROW_STEP` apart, shape (k,)."""
+    step = motion.time[1] - motion.time[0] if len(motion.time) > 1 else ROW_STEP
+    return np.arange(0, len(motion.time), max(1, round(ROW_STEP / step)))
 
 
 def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
@@ -174,7 +187,7 @@ class Enriched:
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""
         lines = [
-            f"{a} and {b} touch at {gap.time:.1f} s (in the nominal motion they do not)"
+            f"{a} and {b} touch at {gap.time:.1f} s in the {NOMINAL_RUN} run (without the offsets they do not)"
             for gap in self.new_contacts
             for a, b in [gap.names]
         ]
@@ -192,7 +205,7 @@ class Enriched:
 
 
 class EventShift(Struct, frozen=True):
-    """One action of an event in both runs, with and without offsets. [s]"""
+    """One action of an event with and without offsets, vehicles under test driving in one way. [s]"""
 
     event: str
     entity: str | None  # its actor
@@ -203,6 +216,7 @@ class EventShift(Struct, frozen=True):
     unexplained_start: float  # what of that is not the way of a lateral action
     unexplained_end: float
     lateral_speed: float = 0.0  # of the entity with offsets when a lateral action begins, which ends it [m/s]
+    run: str = NOMINAL_RUN  # in which this is so: how vehicles under test drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,8 +256,9 @@ class ConvertedScenario:
     warnings: tuple[str, ...] = ()  # what a user has to know, a line each
     content: bytes = b""  # the output's bytes, but for a replay that was written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
-    # shifts: how much earlier or later events of a reactive output come, the largest under several egos [s]
+    # shifts: how much earlier or later events of a reactive output come, in the nominal run and under other egos [s]
     shifts: tuple[EventShift, ...] = ()
+    trial_contacts: tuple[str, ...] = ()  # new ones that only come about under other egos, a line each
     controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
     egos: Mapping[str, str] = field(default_factory=dict)  # vehicles under test, and why each is one
     report: Path | None = None  # page that was written, if one was

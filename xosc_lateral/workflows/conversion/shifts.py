@@ -60,10 +60,12 @@ class Change(Struct, frozen=True):
     time: float
     how: str
     size: float = inf  # of a shift in time; infinite: it is none [s]
+    pair: tuple[str, str] | None = None  # who touches, if that is what happens
+    run: str = ""  # in which it happens, where there are several
 
     def __str__(self) -> str:
         """One line."""
-        return f"{self.what} {self.how} with the offsets"
+        return f"{self.what} {self.how} with the offsets" + (f" (run: {self.run})" if self.run else "")
 
 
 class Comparison(Struct, frozen=True):
@@ -73,6 +75,7 @@ class Comparison(Struct, frozen=True):
     changes: tuple[Change, ...]
     # moving: share of each vehicle's driving time in which it moves sideways; None: it does not drive [-]
     moving: Mapping[str, float | None] = {}
+    run: str = ""  # how vehicles under test drive in both
 
 
 def compare_runs(
@@ -117,7 +120,7 @@ def compare_runs(
     for gap in contacts:
         if gap.names not in touching:
             what = f"contact of '{gap.names[0]}' and '{gap.names[1]}' at {gap.time:.1f} s"
-            changes.setdefault(what, Change(what, gap.names[0], gap.time, "is new"))
+            changes.setdefault(what, Change(what, gap.names[0], gap.time, "is new", pair=gap.names))
     return Comparison(tuple(event_shifts), tuple(changes.values()))
 
 
@@ -299,11 +302,12 @@ def _last_lanes(entity: EntityMotion, end: float) -> list[int]:
 
 
 def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:
-    """Each event once, with its largest shift over several pairs of runs, in order of time."""
-    largest: dict[tuple[str, str | None], EventShift] = {}
+    """Each event once for every way of driving, with its largest shift there: in order of these ways, and of time."""
+    largest: dict[tuple[str, str, str | None], EventShift] = {}
     for shift in (one for comparison in comparisons for one in comparison.shifts):
-        key = shift.event, shift.entity
+        key = shift.run, shift.event, shift.entity
         size = max(abs(shift.start), abs(shift.end))
         if key not in largest or size > max(abs(largest[key].start), abs(largest[key].end), -inf):
             largest[key] = shift
-    return tuple(sorted(largest.values(), key=lambda shift: shift.time))
+    runs = list(dict.fromkeys(run for run, _, _ in largest))
+    return tuple(sorted(largest.values(), key=lambda shift: (runs.index(shift.run), shift.time)))

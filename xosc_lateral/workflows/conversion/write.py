@@ -29,6 +29,7 @@ class Written:
     file: WrittenScenario
     shifts: tuple[EventShift, ...] = ()
     warnings: tuple[str, ...] = ()  # of the check
+    trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
 
     @property
     def with_lane_offsets(self) -> frozenset[str]:

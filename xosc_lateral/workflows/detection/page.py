@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.files.pages.chart import ENRICHED, INK, color_of
+from xosc_lateral.files.pages.chart import ENRICHED, color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Html, Page
 from xosc_lateral.workflows.detection.scoring import Case, Curve
@@ -31,9 +31,18 @@ def detection_page(
 ) -> str:
     """HTML page, self-contained; same input, same bytes."""
     page = Page("Cut-in detectors")
-    page.lead(*lead)
+    telling = _telling(curves)
+    page.lead(lead[0], *([finding(telling)] if telling else []))
+    if telling:
+        page.section("Finding")
+        page.figure(
+            alarms_figure(telling),
+            f"False alarms an hour over the threshold; none at all is drawn at {LEAST_RATE:g}. The dot is the one that "
+            "is set.",
+        )
     page.section("Table")
     page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
+    page.text(*lead[1:])
     page.section(
         "Curves", "From left to right, thresholds become more sensitive. The dot is the threshold that is set."
     )
@@ -55,6 +64,51 @@ def detection_page(
             page.player(scene, f"Case {number} from above", anchor=f"scene-{number}")
         page.figure(_case_figure(case), f"Towards the neighbouring lane; shaded: alarm of {detector}")
     return page.html(provenance)
+
+
+def _telling(curves: Sequence[Curve]) -> list[Curve]:
+    """Of the detector whose false alarms differ most between sources, or are most of all where there is one source."""
+    detectors: dict[str, list[Curve]] = {}
+    for curve in curves:
+        if curve.hours.sum() > 0.0:
+            detectors.setdefault(curve.detector.label(), []).append(curve)
+
+    def spread(some: Sequence[Curve]) -> float:
+        rates = [_rate(curve) for curve in some]
+        return max(rates) - (min(rates) if len(rates) > 1 else 0.0)
+
+    return max(detectors.values(), key=spread, default=[])
+
+
+def _rate(curve: Curve) -> float:
+    """At the threshold that is set. [1/h]"""
+    return float(curve.rate[curve.detector.chosen])
+
+
+def finding(curves: Sequence[Curve]) -> str:
+    """What one detector does on each source, in a sentence."""
+    rates = [f"{_rate(curve):.1f} on {curve.source}" for curve in curves]
+    seen = [
+        f"{100.0 * float(curve.in_time[curve.detector.chosen]):.0f} % of {len(curve.leads)} on {curve.source}"
+        for curve in curves
+        if len(curve.leads)
+    ]
+    before = f" Cut-ins seen before the marking: {', '.join(seen)}." if seen else ""
+    return f"{curves[0].detector.label()} raises false alarms an hour: {', '.join(rates)}.{before}"
+
+
+def alarms_figure(curves: Sequence[Curve]) -> Figure:
+    """False alarms over the threshold of one detector, a colour for each source."""
+    figure = Figure(height=150.0, legend=True)
+    (panel,) = figure.panels
+    for number, curve in enumerate(curves):
+        thresholds, chosen = curve.detector.thresholds, curve.detector.chosen
+        rates = np.maximum(curve.rate, LEAST_RATE)
+        panel.line(thresholds, rates, color_of(number), label=curve.source)
+        panel.dots(thresholds[[chosen]], rates[[chosen]], color_of(number))
+    panel.y.log, panel.y.label, panel.y.holds = True, "false alarms an hour", (LEAST_RATE, 10.0)
+    panel.x.label = curves[0].detector.quantity
+    return figure
 
 
 def curves_figure(curves: Sequence[Curve]) -> Figure:
@@ -91,8 +145,8 @@ def _case_figure(case: Case) -> Figure:
     edges = np.flatnonzero(np.diff(np.r_[False, alarm, False].astype(np.int8)))
     for first, last in edges.reshape(-1, 2):
         panel.across(float(time[first]), float(time[last - 1]), ENRICHED, opacity=0.15)
-    side = case.view.side
-    panel.line(time, side * (track.lateral[rows] - base), INK, label="offset towards the lane [m]")
+    side, color = case.view.side, color_of(_names(case).index(track.name))
+    panel.line(time, side * (track.lateral[rows] - base), color, label="offset towards the lane [m]")
     panel.level(0.5 * float(track.lane_width[rows[0]]) - 0.5 * track.box.width, dashes="3 2")
     panel.x.label, panel.y.label = "time [s]", "offset [m]"
     return figure
@@ -115,7 +169,12 @@ def clip_scene(case: Case) -> str | None:
         *(track for track in case.scene.tracks if track is not watched and _is_near(track, instants, here)),
     ]
     entities = tuple(_motion(track, instants) for track in tracks)
-    return scene_of(Traffic(STEP, entities), network)
+    return scene_of(Traffic(STEP, entities), network, names=_names(case))
+
+
+def _names(case: Case) -> Sequence[str]:
+    """Of all vehicles, in the order of their colours."""
+    return case.scene.names or list(dict.fromkeys(track.name for track in case.scene.tracks))
 
 
 def _is_near(track: LaneTrack, instants: np.ndarray, here: tuple[np.ndarray, np.ndarray]) -> bool:

@@ -139,7 +139,8 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
         there = np.flatnonzero(((entity.activity & Activity.ACTIVE) != 0) & (entity.road >= 0))
         if len(there) > 1:
             tracks += tracks_of(in_lanes(entity.at(there), played.network), cluster=f"{cluster or name}:{entity.name}")
-    return Scene(name, tuple(tracks), None if ego == "none" else ego, played.network)
+    names = tuple(entity.name for entity in played.motion.entities)
+    return Scene(name, tuple(tracks), None if ego == "none" else ego, played.network, names)
 
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------

@@ -54,6 +54,7 @@ class Scene:
     tracks: tuple[LaneTrack, ...]
     ego: str | None = None  # the vehicle whose neighbours are watched; None: everybody's
     network: RoadNetwork | None = None
+    names: tuple[str, ...] = ()  # of all that the run holds, in its order, on which colours go; unknown: of the tracks
 
 
 def tracks_of(motion: EntityMotion, *, cluster: str, cuts: Sequence[int] = ()) -> Iterator[LaneTrack]:

@@ -27,7 +27,12 @@ TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")
 
 PROFILES = flag("--vehicle", kind=list[str] | None, read=texts, metavar="NAME=PROFILE",
     help="Another profile for one vehicle; may be repeated.")  # fmt: skip
-EGO = flag(kind=list[str] | None, metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
+EGO = flag(
+    kind=list[str] | None,
+    metavar="NAME",
+    help="Vehicle under test: not driven; may be repeated. "
+    "Those called ego, hero, ... are found by themselves. none: there is none.",
+)
 FOLDERS = replace(SHARED["library"], flags=("--library",))
 
 
@@ -41,7 +46,7 @@ def live_esmini(
     window: Annotated[bool, flag("--window", help="Open esmini's window.")] = False,
     profile: ProfileLike = "motorway",
     profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
-    ego: Annotated[Sequence[str], EGO] = (),
+    ego: Annotated[Sequence[str] | None, EGO] = None,
     seed: int = 0,
     neighbours: str = "borrow",
     folders: Annotated[Paths, FOLDERS] = (),
@@ -76,7 +81,8 @@ def live_esmini(
     finally:
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
-    scene = Scene(traffic.entities, lambda: traffic.network, ego)
+    under_test = [one.name for one in traffic.entities if one.name in traffic.ego]
+    scene = Scene(traffic.entities, lambda: traffic.network, under_test)
     standing = [name for name in sorted(traffic.waits) if len({row[2:4] for row in rows if row[1] == name}) == 1]
     stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
              "with EsminiTraffic" for name in standing]  # fmt: skip
@@ -94,7 +100,7 @@ def live_sumo(
         flag(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0)] = None,
     profile: ProfileLike = "motorway",
     profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
-    ego: Annotated[Sequence[str], EGO] = (),
+    ego: Annotated[Sequence[str] | None, EGO] = None,
     seed: int = 0,
     options: Sequence[str] = (),
     neighbours: str = "borrow",
@@ -126,13 +132,15 @@ def live_sumo(
         rows, time = run_to_end(traffic, end, float(connection.simulation.getDeltaT())), traffic.time()
     finally:
         connection.close()
-    if strangers := sorted({*ego, *others} - traffic.entities.keys()):
+    if strangers := sorted({*traffic.ego.named, *others} - traffic.entities.keys()):
         seen = f"; there were {', '.join(sorted(traffic.entities)[:5])} ..." if traffic.entities else ""
         raise SimulationError(f"{config}: no vehicle {strangers[0]!r} until {time:g} s{seen}")
     settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
     counts = [f"SUMO reports {count} {what}" for what, count in traffic.counts.items() if count]
-    scene = Scene(tuple(traffic.entities.values()), partial(sumo_network, net), ego, is_road=False)
-    return LiveRun(rows, settings, [*traffic.warnings, *traffic.traffic.fault_lines(), *counts], scene)
+    under_test = [name for name in traffic.entities if name in traffic.ego]
+    scene = Scene(tuple(traffic.entities.values()), partial(sumo_network, net), under_test, is_road=False)
+    notes = not_driven({name: f"it is under test{traffic.ego.why(name)}" for name in under_test})
+    return LiveRun(rows, settings, [*traffic.warnings, *traffic.traffic.fault_lines(), *counts], scene, notes=notes)
 
 
 class LiveRun(Result):

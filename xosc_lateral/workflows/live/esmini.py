@@ -26,6 +26,7 @@ from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, Told
 from xosc_lateral.workflows.live.loop import Row
 from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.live.under_test import UnderTest
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
 from xosc_lateral.world.scenario.private_actions import (
@@ -71,7 +72,7 @@ class EsminiTraffic:
     Call `steer` before every ``SE_StepDT``, and `settle` after it; all else stays with the caller: opening, stepping,
     an external ego. The `library` is its path, a `ctypes.CDLL` or an object with the same functions, in which
     ``SE_Init`` was called for the `scenario`, which says which actions are lateral, and whose. Nobody of ours drives
-    the `ego`, one or several; they are seen where they are. `on_element` is called as esmini's storyboard callback, of
+    the `ego`, see `UnderTest`; they are seen where they are. `on_element` is called as esmini's storyboard callback, of
     which there is one. For `seed`, `profiles` and `neighbours` see `Traffic`.
     """
 
@@ -81,7 +82,7 @@ class EsminiTraffic:
         scenario: str | Path | Scenario,
         profile: DriverProfile,
         *,
-        ego: str | Iterable[str] = (),
+        ego: str | Iterable[str] | None = None,
         seed: int = 0,
         profiles: dict[str, DriverProfile] | None = None,
         neighbours: Neighbours = Neighbours.BORROW,
@@ -90,7 +91,7 @@ class EsminiTraffic:
         self.player = library if isinstance(library, Player) else Player(library)
         model = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         self.entities = model.entities
-        self._ego = {ego} if isinstance(ego, str) else set(ego)
+        self.ego = UnderTest(ego, profiles or ())
         controlled = controlled_entities(model).items()  # the state of a vehicle names longitudinal controllers alone
         self._steered = {name for name, control in controlled if Domains.LATERAL in control.domains}
         self._moved_by = lateral_actions(model)
@@ -124,7 +125,7 @@ class EsminiTraffic:
             self._follow_action(*element)
         self._touched.clear()  # what is over by now has put everybody where he begins
         names = {name for name, _ in self._objects()}
-        if missing := sorted((self._ego | set(profiles or {})) - names):
+        if missing := sorted((self.ego.named | set(profiles or {})) - names):
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
         self.moves: dict[str, tuple[float, bool]] = {}
@@ -265,13 +266,15 @@ class EsminiTraffic:
 
     def _why_not_ours(self, name: str, state: ObjectState) -> str:
         """Why no driver of ours has a vehicle; empty: he may."""
-        if name in self._ego:
+        if name in self.ego.named:
             return "it is under test"
         if state.category in _PULLED_CATEGORIES:
             return "it is pulled"
         if state.ctrl_type in EXTERNAL_CONTROLLERS:
             self.waits.add(name)
             return "its controller waits for another program"
+        if name in self.ego:
+            return f"it is under test{self.ego.why(name)}"
         return "a controller of its own steers it" if state.ctrl_type != 0 or name in self._steered else ""
 
     def _moment(self, seen: dict[str, ObjectState], dt: float) -> tuple[Moment, list[Place]]:

@@ -27,6 +27,7 @@ from xosc_lateral.workflows.live.loop import Row
 from xosc_lateral.workflows.live.paths import Moves
 from xosc_lateral.workflows.live.scene import CATEGORY_OF_CLASS, sumo_entity
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.live.under_test import UnderTest
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
 from xosc_lateral.world.surroundings.context import TRUCKS
@@ -186,8 +187,9 @@ class _Vehicle:
 class SumoTraffic:
     """Drivers of the vehicles of a SUMO simulation that runs; call `steer` before (or after) every ``simulationStep``.
 
-    The `connection` is libsumo, or one of traci, with a loaded simulation. Nobody of ours drives the `ego`, one or
-    several. For `seed`, `profiles`, `neighbours` see `Traffic`. Raises `SimulationError` if the sublane model is off.
+    The `connection` is libsumo, or one of traci, with a loaded simulation. Nobody of ours drives the `ego`,
+    see `UnderTest`. For `seed`, `profiles`, `neighbours` see `Traffic`. Raises `SimulationError` if the sublane
+    model is off.
     """
 
     def __init__(
@@ -195,7 +197,7 @@ class SumoTraffic:
         connection: Any,
         profile: DriverProfile,
         *,
-        ego: str | Iterable[str] = (),
+        ego: str | Iterable[str] | None = None,
         seed: int = 0,
         profiles: Mapping[str, DriverProfile] | None = None,
         neighbours: Neighbours = Neighbours.BORROW,
@@ -205,7 +207,7 @@ class SumoTraffic:
         if sublane <= 0.0:
             raise SimulationError("SUMO's sublane model is off: start it with --lateral-resolution 4, say")
         self.roads = SumoRoads(connection)
-        self._ego = {ego} if isinstance(ego, str) else set(ego)
+        self.ego = UnderTest(ego, profiles or ())
         self.traffic = Traffic(
             profile, profiles=profiles, seed=seed, roads=self.roads, left_hand=self.roads.left_hand,
             neighbours=neighbours,
@@ -303,7 +305,7 @@ class SumoTraffic:
         return Moment(
             names, speed, np.array([self.roads.width[place] for place in where]), offset, following,
             np.array(
-                [name not in self._ego and one.kind not in UNDRIVEN_CLASSES for name, one in self._known.items()],
+                [name not in self.ego and one.kind not in UNDRIVEN_CLASSES for name, one in self._known.items()],
                 np.bool_,
             ),
             np.array([CATEGORY_OF_CLASS.get(one.kind) in TRUCKS for one in vehicles], dtype=np.bool_),

@@ -172,7 +172,7 @@ class Playback(Result):
         from xosc_lateral.files.output_tables import output_suffixes, write_table
 
         output = output_file(path, f"{self.scenario.stem}.csv", output_suffixes())
-        claim([output], self._inputs(), force=force)
+        claim([output], self.files, force=force)
         write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
         return output
 
@@ -187,7 +187,24 @@ class Playback(Result):
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page that plays the scenario; into a folder as ``NAME_view.html``."""
-        return write_page(path, f"{self.scenario.stem}_view.html", self.page, inputs=self._inputs(), force=force)
+        return write_page(path, f"{self.scenario.stem}_view.html", self.page, inputs=self.files, force=force)
+
+    def write_image(self, path: PathLike, at: float | None = None, *, force: bool = False) -> Path:
+        """Write a moment from above as ``.svg`` or ``.png`` (extra `pictures`); `at`: by default half. [s]"""
+        from xosc_lateral.workflows.playing.picture import write_image
+
+        return write_image(self._scene(), path, at, usual_name=self.scenario.stem, inputs=self.files, force=force)
+
+    def write_animation(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the run from above as ``.gif`` (extra `pictures`), in real time."""
+        from xosc_lateral.workflows.playing.picture import write_animation
+
+        return write_animation(self._scene(), path, usual_name=self.scenario.stem, inputs=self.files, force=force)
+
+    def _scene(self) -> str:
+        from xosc_lateral.workflows.playing.scene import scene_of
+
+        return scene_of(self._played.motion, self._played.network)
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
@@ -196,17 +213,19 @@ class Playback(Result):
         from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
-        claim([output], self._inputs(), force=force)
+        claim([output], self.files, force=force)
         motion, network = self._played.motion, self._played.network
         host = next(iter(vehicles_under_test(self._played.scenario)), None)
         return write_osi(output, motion, network, host=host, description=f"{self.scenario.name}, as its maneuvers say")
 
-    def _inputs(self) -> list[Path]:
+    @property
+    def files(self) -> list[Path]:
+        """All that were read."""
         scenario = self._played.scenario
         return [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
 
     def _provenance(self) -> dict[str, Any]:
-        return {"inputs": parsed_hashes(self._inputs())}
+        return {"inputs": parsed_hashes(self.files)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,7 +13,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
-from xosc_lateral.workflows.conversion.result import Enriched, EntityResult
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, shown_rows
 from xosc_lateral.workflows.playing.scene import lane_surfaces, markings, scene_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, Note
 from xosc_lateral.world.motion.segments import Crossing
@@ -21,9 +21,6 @@ from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
 
 Rows = NDArray[np.int64]
-
-ROW_STEP = 0.1
-"""Rows that are drawn. [s]"""
 
 ROAD_MARGIN = 30.0
 """Road that is drawn before and after the paths. [m]"""
@@ -50,12 +47,6 @@ def _extents_on_roads(enriched: Enriched) -> dict[int, tuple[float, float]]:
     whole = {road: np.concatenate(parts) for road, parts in covered.items()}
     order = sorted(whole, key=lambda road: -len(whole[road]))
     return {road: (float(whole[road].min()), float(whole[road].max())) for road in order}
-
-
-def shown_rows(motion: EntityMotion) -> Rows:
-    """Rows that are drawn, 0.1 s apart, shape (k,)."""
-    step = motion.time[1] - motion.time[0] if len(motion.time) > 1 else ROW_STEP
-    return np.arange(0, len(motion.time), max(1, round(ROW_STEP / step)))
 
 
 def _breaks(motion: EntityMotion, rows: Rows) -> NDArray[np.bool_]:
@@ -208,7 +199,7 @@ def accelerations_over_time(enriched: Enriched, entities: Sequence[EntityResult]
     figure = _figure_of_each(entities, "added [m/s²]")
     for panel, entity in zip(figure.panels, entities, strict=True):
         rows = shown_rows(entity.motion)
-        time, added = entity.motion.time[rows], entity.lateral_acceleration()[rows]
+        time, added = entity.motion.time[rows], entity.lateral_acceleration()
         for bound in (-USUAL_ACCELERATION, USUAL_ACCELERATION):
             panel.level(bound, color=NOMINAL, dashes=DASHED)
         panel.line(time, added, color_of(_number_of(enriched, entity)), label="added")

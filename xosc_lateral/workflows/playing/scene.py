@@ -47,11 +47,21 @@ LINE_TOLERANCE = 0.01
 """Lines are simplified to this: less than a tenth of a marking's width. [m]"""
 
 
-def scene_of(motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult] = ()) -> str:
-    """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone."""
+def scene_of(
+    motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult] = (), *, names: Sequence[str] = ()
+) -> str:
+    """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone.
+
+    `names`: of all vehicles in the order that decides on their colours; without: the motion's own
+    """
     pairs: list[tuple[EntityMotion, EntityResult | None]] = [(result.motion, result) for result in results]
     pairs = pairs or [(entity, None) for entity in motion.entities]
-    shown = [(number, entity, result) for number, (entity, result) in enumerate(pairs) if _present(entity).any()]
+    place = {name: number for number, name in enumerate(names)}
+    shown = [
+        (place.get(entity.name, number), entity, result)
+        for number, (entity, result) in enumerate(pairs)
+        if _present(entity).any()
+    ]
     rows = _rows(motion, len(shown))
     places = [np.column_stack([entity.x, entity.y])[_present(entity)] for _, entity, _ in shown]
     # whole metres near the first place: coordinates stay small on roads with geographic ones
