@@ -45,7 +45,7 @@ def test_a_condition_that_stops_it_is_refused(tmp_path: Path) -> None:
             played(scenario),
             {},
             tmp_path / "out.xosc",
-            chains=[],
+            paths=[],
             provenance={},
             summary="",
             target=target("esmini"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tests.files.test_openscenario_write import LANE_CHANGE, nominal, played, provenance, sine_chain
+from tests.files.test_openscenario_write import LANE_CHANGE, nominal, played, provenance, sine_path
 from tests.kit.motion import drive, entity, together, two_roads
 from tests.kit.scenario_files import action, event, made, time_condition
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -90,19 +90,19 @@ def test_a_maneuver_of_a_catalog_is_written_out_where_the_offsets_refer_to_it(tm
     catalogs = '<ManeuverCatalog><Directory path="catalogs"/></ManeuverCatalog>'
     scenario = made(tmp_path, catalogs=catalogs, stories=stories, stop=time_condition(20))
     motion = played(scenario, 30.0)
-    chain = sine_chain("Ego")
+    path = sine_path("Ego")
     output = tmp_path / "out.xosc"
     write_converted(
         scenario,
         motion,
         {},
         output,
-        chains=[chain],
+        paths=[path],
         provenance=provenance(scenario),
         summary="",
     )
     root = etree.parse(str(output)).getroot()
     references = {item.get("storyboardElementRef") for item in root.iter("StoryboardElementStateCondition")}
     assert "aside" in references
-    assert references - {chain.entity} <= {item.get("name") for item in root.iter("Act", "Event", "Action")}
+    assert references - {path.entity} <= {item.get("name") for item in root.iter("Act", "Event", "Action")}
     assert played(read_scenario(output), 30.0).end_time == pytest.approx(motion.end_time)

@@ -132,7 +132,7 @@ def outputs(seed: int) -> dict[str, str]:
                             motion,
                             paths,
                             path.with_name("o.xosc"),
-                            chains=(),
+                            paths=(),
                             **words,
                         )
                 except FormatError as error:

@@ -33,18 +33,21 @@ needs_esmini = pytest.mark.skipif("ESMINI_LIBRARY" not in os.environ, reason="ES
 def scenario(
     folder: Path, controller: str, flags: dict[str, str], *, events: str = "", start: bool = True, minor: int = 2
 ) -> Path:
-    """Ego has a controller, A brakes when it is near, B changes lanes by the clock."""
-    places = {"Ego": ("50", "30"), "A": ("130", "25"), "B": ("300", "25")}
+    """Car has a controller, A brakes when it is near, B changes lanes by the clock.
+
+    An entity named Ego would be under test by its name alone.
+    """
+    places = {"Car": ("50", "30"), "A": ("130", "25"), "B": ("300", "25")}
     text = scenario_text(
         minor=minor,
-        entities="".join(entity(name, controller=controller if name == "Ego" else "") for name in places),
+        entities="".join(entity(name, controller=controller if name == "Car" else "") for name in places),
         init="".join(
-            private(name, teleport(s), speed_action(v), *([activation(**flags)] if name == "Ego" and start else []))
+            private(name, teleport(s), speed_action(v), *([activation(**flags)] if name == "Car" and start else []))
             for name, (s, v) in places.items()
         ),
         stories=stories(
-            ("Ego", event("own", at(1.0), speed_action("31")) + events),
-            ("A", event("brake", headway("Ego", "A"), speed_action("20"))),
+            ("Car", event("own", at(1.0), speed_action("31")) + events),
+            ("A", event("brake", headway("Car", "A"), speed_action("20"))),
             ("B", event("clock", at(3.0), CHANGE)),
         ),
         stop=time_condition(12),
@@ -57,12 +60,12 @@ def test_a_car_with_acc_keeps_it_and_its_place_in_the_lane_and_who_depends_on_it
     path = scenario(tmp_path, object_controller("ACCController"), LONGITUDINAL)
     made = xl.convert(path, tmp_path / "out.xosc", seed=2)
     assert made.modes == {"A": "lane-offset", "B": "trajectory"}
-    assert "Ego: as in the scenario (driven by controller 'ACCController': along the road)" in str(made)
+    assert "Car: as in the scenario (driven by controller 'ACCController': along the road)" in str(made)
     assert made.ego == () and not made.is_replay and made.warnings == ()
-    assert "'Ego' is left to controller 'ACCController': along the road" in str(made)
+    assert "'Car' is left to controller 'ACCController': along the road" in str(made)
     said = made.to_dict()["controllers"]
-    assert said == {"Ego": {"controllers": ["'ACCController'"], "drives": "along the road"}}
-    assert b"ACCController" in _of(path, "Ego")[0] and _of(path, "Ego")[0] == _of(made.output or path, "Ego")[0]
+    assert said == {"Car": {"controllers": ["'ACCController'"], "drives": "along the road"}}
+    assert b"ACCController" in _of(path, "Car")[0] and _of(path, "Car")[0] == _of(made.output or path, "Car")[0]
     assert b'ActivateControllerAction longitudinal="true"' in made.data
 
 
@@ -71,17 +74,17 @@ def test_a_car_that_a_controller_steers_stays_as_it_is(tmp_path: Path, name: str
     flags = LONGITUDINAL if name == "NaturalDriver" else BOTH
     made = xl.convert(scenario(tmp_path, object_controller(name), flags), tmp_path / "out.xosc", seed=2)
     assert made.modes == {"A": "lane-offset", "B": "trajectory"}
-    assert f"Ego: as in the scenario (driven by controller '{name}': along and across the road)" in str(made)
+    assert f"Car: as in the scenario (driven by controller '{name}': along and across the road)" in str(made)
 
 
 def test_before_a_controller_steers_and_after_it_the_car_moves_as_any_other(tmp_path: Path) -> None:
     off = {"longitudinal": "false", "lateral": "false"}
     switches = event("on", at(4.0), activation(**BOTH)) + event("off", at(8.0), activation(**off))
     path = scenario(tmp_path, object_controller("our driver"), {}, events=switches, start=False)
-    rows = [row for row in xl.segments(path).to_dict()["segments"] if row["entity"] == "Ego"]
+    rows = [row for row in xl.segments(path).to_dict()["segments"] if row["entity"] == "Car"]
     assert [row["why"] for row in rows] == ["", "steered by a controller", ""]
     assert [row["start"] for row in rows] == pytest.approx([0.0, 4.0, 8.0], abs=0.05)
-    assert "'Ego' is driven by controller 'our driver': along and across the road" in str(xl.segments(path))
+    assert "'Car' is driven by controller 'our driver': along and across the road" in str(xl.segments(path))
     assert any("'our driver' along and across the road from 4.02 s on" in note for note in xl.play(path).notes)
     xl.convert(path, tmp_path / "out.xosc", seed=2)
     own = play_scenario(tmp_path / "out.xosc").motion.entities[0]
@@ -100,23 +103,23 @@ def test_a_replay_of_whoever_a_controller_drives_says_so_once_and_strict_refuses
     path = scenario(tmp_path, object_controller("ACCController"), LONGITUDINAL)
     for options in ({"ego": "none"}, {"mode": "trajectory"}):
         made = xl.convert(path, tmp_path / "out.xosc", **options, force=True)
-        assert made.is_replay and set(made.modes) == {"Ego", "A", "B"}
+        assert made.is_replay and set(made.modes) == {"Car", "A", "B"}
         (line,) = made.warnings
-        assert "'Ego' follows a trajectory: controller 'ACCController': along the road" in line
+        assert "'Car' follows a trajectory: controller 'ACCController': along the road" in line
     words = ["convert", str(path), "-o", str(tmp_path / "out.xosc"), "--ego", "none", "-q"]
     assert (main(words), main([*words, "--strict"])) == (0, 1)
 
 
 def test_a_replay_moves_a_car_also_where_a_controller_would_steer(tmp_path: Path) -> None:
     made = xl.convert(scenario(tmp_path, object_controller("our driver"), BOTH), ego="none")
-    assert made.modes["Ego"] == "trajectory"
+    assert made.modes["Car"] == "trajectory"
 
 
 def test_for_carla_a_driven_car_is_left_as_it_is(tmp_path: Path) -> None:
     path = scenario(tmp_path, object_controller("ACCController"), LONGITUDINAL, minor=0)
     made = xl.convert(path, tmp_path / "out.xosc", player="carla")
-    assert "Ego" not in made.modes and made.modes["B"] == "trajectory"
-    assert "Ego: as in the scenario (driven by controller 'ACCController': along the road)" in str(made)
+    assert "Car" not in made.modes and made.modes["B"] == "trajectory"
+    assert "Car: as in the scenario (driven by controller 'ACCController': along the road)" in str(made)
 
 
 @needs_esmini
@@ -126,8 +129,8 @@ def test_in_esmini_a_car_with_acc_drives_as_in_the_source_and_live_leaves_it_alo
     runs = []
     for file in (path, tmp_path / "out.xosc"):
         # Everybody counts as under test, so that nobody of ours drives: esmini's own run of the file.
-        frame = live_esmini(file, os.environ["ESMINI_LIBRARY"], ego=["Ego", "A", "B"], duration=11.0).to_frame()
-        runs.append(frame[frame.name == "Ego"])
+        frame = live_esmini(file, os.environ["ESMINI_LIBRARY"], ego=["Car", "A", "B"], duration=11.0).to_frame()
+        runs.append(frame[frame.name == "Car"])
     assert np.ptp(runs[0].speed) > 3.0  # it follows A, which the default driver would not
     assert np.abs(runs[0].s.to_numpy() - runs[1].s.to_numpy()).max() < 0.02
     alone = live_esmini(path, os.environ["ESMINI_LIBRARY"], duration=5.0).to_frame()

@@ -84,11 +84,19 @@ def test_at_40_km_h_and_above_the_clock_changes_nothing(tmp_path: Path) -> None:
     np.testing.assert_allclose(fast.entities[1].segments[0].offset, equal.entities[1].segments[0].offset, atol=1e-6)
 
 
-def test_a_jam_corridor_is_left_where_it_is_asked_for_and_said_to_be_assumed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("neighbours", ["none", "profile"])
+def test_a_jam_corridor_is_left_where_it_is_asked_for_and_said_to_be_assumed(tmp_path: Path, neighbours: str) -> None:
     for file, text in find_template("jam-end").files({}).items():
         (tmp_path / file).write_text(text, encoding="utf-8")
     plain, aside = (
-        convert(tmp_path / "jam-end.xosc", seed=1, ego=["none"], mode="trajectory", jam_corridor=asked)
+        convert(
+            tmp_path / "jam-end.xosc",
+            seed=1,
+            ego=["none"],
+            mode="trajectory",
+            jam_corridor=asked,
+            neighbours=neighbours,
+        )
         for asked in (False, True)
     )
     moved = [
@@ -98,7 +106,9 @@ def test_a_jam_corridor_is_left_where_it_is_asked_for_and_said_to_be_assumed(tmp
     ]
     leftmost = max(lane for _, lane in moved)
     for by, lane in moved:
-        assert 0.25 < by * (1.0 if lane == leftmost else -1.0) <= 0.45  # who is beside gives way a little
+        # Who overtakes keeps left of others anyway, and needs less of that where they keep right.
+        least = 0.1 if lane == leftmost and neighbours == "profile" else 0.399
+        assert least < by * (1.0 if lane == leftmost else -1.0) < 0.401
     assert any("jam corridor: assumed" in line for line in aside.warnings)
     assert not any("jam corridor" in line for line in plain.warnings)
     assert aside.provenance.options["jam_corridor"] is True

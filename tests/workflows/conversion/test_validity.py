@@ -36,6 +36,6 @@ def test_a_lone_lane_that_is_none_of_a_road_moves_nobody_unless_named(
         named = xl.convert(path, tmp_path / "named.xosc", seed=1, ego="none", time_limit=8.0,
                            entity={"Truck": "motorway"})  # fmt: skip
         assert [one["name"] for one in named.to_dict()["entities"] if one["profile"]] == ["Truck"]
-    assert any("m wide (measured: 3.68 to 3.86)" in line for line in made.warnings) == (
+    assert any("m wide (measured: 3.69 to 3.85)" in line for line in made.warnings) == (
         width == 4.5 or (width == 9.0 and not alone)
     )

@@ -40,13 +40,17 @@ class Written:
 def write(plan: Plan, sampled: Enriched) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    folder, profiles = plan.source.parent, {one.name: one.profile for one in sampled.entities if one.profile}
+    folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
         scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
         inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
-        profiles={name: (profile.name, profile_hash(profile)) for name, profile in profiles.items()},
+        profiles={
+            name: (one.name, profile_hash(one))
+            for name, one in plan.drivers.items()
+            if name in driven and not isinstance(one, str)
+        },
         options=plan.settings.record(folder),
         variant=plan.variant_index + 1,
         version=version_text(plan.version),
