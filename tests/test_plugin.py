@@ -79,7 +79,7 @@ def test_an_importer_is_a_verb_of_import(site, tmp_path):
 
 def test_templates_and_profiles_are_listed_with_the_shipped_ones(site, tmp_path):
     run(site, tmp_path, "-m", "xosc_lateral", "template", "write", "acme-straight", "-o", ".", "--set", "speed=25")
-    words = ["convert", "acme-straight.xosc", "-o", "out.xosc", "--profile", "acme-calm"]
+    words = ["convert", "acme-straight.xosc", "-o", "out.xosc", "--profile", "acme-calm", "--ego", "none"]
     assert "profile acme-calm" in run(site, tmp_path, "-m", "xosc_lateral", *words)
     assert "acme-calm" in run(site, tmp_path, "-m", "xosc_lateral", "profiles", "list")
 

@@ -100,6 +100,16 @@ def together() -> Iterator[None]:
         _move(staged)
 
 
+@contextmanager
+def at_once() -> Iterator[None]:
+    """Files that are written in the block appear one by one, also within `together`: others' code reads its own."""
+    token = _STAGED.set(None)
+    try:
+        yield
+    finally:
+        _STAGED.reset(token)
+
+
 def _move(staged: Mapping[Path, Path]) -> None:
     """Move temporary files to their places; once begun, it is gone through with."""
     try:

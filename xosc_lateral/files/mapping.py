@@ -248,24 +248,24 @@ def standard_sources(
     for header in whole.values():
         stem, unit = parts_of(header.strip())
         bare.setdefault(stem, (header, unit))
-    found = {}
+    matches = {}
     for name, usual in names.items():
         for header in usual:
             if header in whole:
-                found[name] = ColumnSource(whole[header])
+                matches[name] = ColumnSource(whole[header])
             elif header in bare:
                 column, unit = bare[header]
                 try:
-                    found[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
+                    matches[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
                 except ValueError as error:
                     if "[" in column or "(" in column:
                         raise FormatError(str(error), path=path, element=f"column {column!r}") from error
             elif strange := next((text for text in whole.values() if re.match(rf"{header}\s*\[", text, re.I)), None):
                 what = f"unknown unit; known: {', '.join(UNITS)}: --map {name}=COLUMN:UNIT names it"
                 raise FormatError(what, path=path, element=f"column {strange!r}")
-            if name in found:
+            if name in matches:
                 break
-    return found
+    return matches
 
 
 def read_mapping(path: Path) -> TableMapping:

@@ -19,7 +19,7 @@ from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import check_profile
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata
 from xosc_lateral.drivers.model.records import plain
-from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.atomic import at_once, write_atomically
 from xosc_lateral.files.configuration import configured_libraries
 from xosc_lateral.files.json_text import canonical_json, parse_json
 from xosc_lateral.files.output_paths import file_name
@@ -97,8 +97,9 @@ def _from_plugins() -> dict[str, Path]:
     """Profiles that other packages offer: entry points that are a folder, or a function that gives one."""
     paths: dict[str, Path] = {}
     for offered in plugins(GROUP).values():
-        folder = Path(offered() if callable(offered) else offered)
-        paths |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+        with at_once():
+            folder = Path(offered() if callable(offered) else offered)
+        paths |= {path.stem: path for path in sorted(folder.glob(f"[!.]*{SUFFIX}"))}
     return paths
 
 

@@ -169,26 +169,28 @@ def _zstd(file: IO[bytes]) -> Any:
     return pa.CompressedInputStream(pa.PythonFile(file, mode="r"), "zstd")
 
 
-def frame_of(given: Any) -> pd.DataFrame:
+def frame_of(supplied: Any) -> pd.DataFrame:
     """Whatever holds columns as a data frame: Arrow's stream or pandas' interchange protocol, lazy frames of dask and
     polars, a dict of arrays; times in the index become a column. Raises `TypeError`.
     """
-    if not isinstance(given, pd.DataFrame):
+    if not isinstance(supplied, pd.DataFrame):
         for lazy in ("compute", "collect"):
-            given = getattr(given, lazy)() if hasattr(given, lazy) and not isinstance(given, dict) else given
-    if isinstance(given, dict):
-        given = pd.DataFrame(given)
-    elif not isinstance(given, pd.DataFrame) and hasattr(given, "__arrow_c_stream__"):
+            supplied = (
+                getattr(supplied, lazy)() if hasattr(supplied, lazy) and not isinstance(supplied, dict) else supplied
+            )
+    if isinstance(supplied, dict):
+        supplied = pd.DataFrame(supplied)
+    elif not isinstance(supplied, pd.DataFrame) and hasattr(supplied, "__arrow_c_stream__"):
         import pyarrow as pa
 
-        given = pa.table(given).to_pandas()
-    elif not isinstance(given, pd.DataFrame) and hasattr(given, "__dataframe__"):
-        given = pd.api.interchange.from_dataframe(given)
-    if not isinstance(given, pd.DataFrame):
-        raise TypeError(f"no table: {type(given).__name__}; a path, a data frame or a dict of columns is read")
-    if "time" not in given.columns and isinstance(given.index, pd.DatetimeIndex | pd.TimedeltaIndex):
-        return given.reset_index(names="time")
-    return given
+        supplied = pa.table(supplied).to_pandas()
+    elif not isinstance(supplied, pd.DataFrame) and hasattr(supplied, "__dataframe__"):
+        supplied = pd.api.interchange.from_dataframe(supplied)
+    if not isinstance(supplied, pd.DataFrame):
+        raise TypeError(f"no table: {type(supplied).__name__}; a path, a data frame or a dict of columns is read")
+    if "time" not in supplied.columns and isinstance(supplied.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+        return supplied.reset_index(names="time")
+    return supplied
 
 
 def text_encoding(path: Path) -> str:

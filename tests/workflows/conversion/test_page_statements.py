@@ -12,7 +12,7 @@ from lxml import html
 
 import xosc_lateral as xl
 from tests.kit.enriched import converted, made_enriched
-from xosc_lateral.workflows.conversion.meaning import OTHER_RUNS, Kept
+from xosc_lateral.workflows.conversion.meaning import OTHER_RUNS, KeptMeaning
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison
@@ -129,7 +129,7 @@ def test_what_other_egos_cause_is_never_told_as_the_scenario_s_own(tmp_path: Pat
     )
     contact = Change("contact of 'Ego' and 'Van' at 34.0 s", "Ego", 34.0, "is new", pair=("Ego", "Van"), run=braking)
     own = Change("contact of 'Slow' and 'Van' at 4.0 s", "Slow", 4.0, "is new", pair=("Slow", "Van"), run=NOMINAL_RUN)
-    kept = Kept((), tuple(Comparison((one,), ()) for one in shifts), (own, contact), {})
+    kept = KeptMeaning((), tuple(Comparison((one,), ()) for one in shifts), (own, contact), {})
     assert kept.shifts == shifts
     assert kept.trial_contacts == (f"{contact.what} is new with the offsets (run: {braking})",)
     lines = tuple(kept.warnings((), {("Slow", "Van")}))

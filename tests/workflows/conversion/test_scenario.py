@@ -49,7 +49,7 @@ def test_numbers_on_the_page_are_those_of_the_result(enriched, plain):
     ego = enriched.entity("Ego")
     acceleration = 0.3 * (2.0 * np.pi / 10.0) ** 2
     assert f"largest added lateral acceleration {acceleration:.2f} m/s²" in said
-    assert f"Ego – 1 30.0 {ego.offset_spread:.3f} 0.300" in said
+    assert f"Ego – 1 30.0 {ego.offset_spread:.3f} 0.30 " in said
     assert "Slow below 40 km/h throughout" in said
     assert "Nothing: every action and condition was played" in said
 
@@ -77,7 +77,7 @@ def test_a_scenario_in_which_nothing_was_enriched_gets_a_page_that_says_so(enric
     alone = enriched.entity("Slow")
     said = text(page(replace(enriched, entities=(alone,), gaps_before=(), gaps_after=())))
     assert "No entity was enriched" in said
-    assert "No two vehicles come that close to each other." in said
+    assert "No two vehicles come that close to each other there." in said
 
 
 def test_provenance_is_in_the_footer(plain):

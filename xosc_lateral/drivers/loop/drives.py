@@ -50,7 +50,7 @@ class Pooled:
 
         return max(2.0 * float(t.sf(abs(self.size) / max(self.error, 1e-300), self.degrees)), MINIMUM_P)
 
-    def smallest(self, level: float) -> float:
+    def detectable_size(self, level: float) -> float:
         """Size that is found with 80 % probability at a level, in the size's unit."""
         from scipy.stats import t
 

@@ -143,11 +143,12 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 else:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
-                    if (own := test.own_way) is not None:
-                        why = (
-                            f"it changes within drives (p = {own:.1e}), in each in its own way, which no profile knows"
-                        )
-                    rejected[component] = Rejected(component, test.columns, test.p_value, why, own_way=own is not None)
+                    if (own_way := test.own_way) is not None:
+                        why = f"it changes within drives (p = {own_way:.1e}), in each in its own way"
+                        why = f"{why}, which no profile knows"
+                    rejected[component] = Rejected(
+                        component, test.columns, test.p_value, why, own_way=own_way is not None
+                    )
             if not passed:
                 break
             p_value, new, test = min(passed, key=lambda candidate: candidate[0])
@@ -175,12 +176,12 @@ def failed(what: str, error: Exception) -> str:
 
 def _that_can_be_told(selection: Selection) -> Selection:
     """Less what can't be sized or described: one faulty effect must not cost the others."""
-    for one in selection.accepted:
-        alone = fit_model(selection.final.coarse, [*selection.start.terms, one.term])
+    for each_one in selection.accepted:
+        alone = fit_model(selection.final.coarse, [*selection.start.terms, each_one.term])
         try:
-            one.term.describe(alone, one.term.estimate(alone), "")
+            each_one.term.describe(alone, each_one.term.estimate(alone), "")
         except UNFORESEEN as error:
-            selection = selection.without([one.term], failed("its description", error))
+            selection = selection.without([each_one.term], failed("its description", error))
     return selection
 
 

@@ -159,7 +159,7 @@ def sample(plan: Plan) -> Enriched:
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
             lane_changes=settings.lane_changes,
-            least_time=0.0 if plan.is_replay else plan.prepared.meaning(tuple(plan.egos)).longest,
+            least_time=0.0 if plan.is_replay else plan.prepared.meaning(tuple(plan.egos)).longest_time,
         )
     except DriverProfileError as error:  # sampling does not know the file
         raise DriverProfileError(f"{plan.source}: {error}") from error

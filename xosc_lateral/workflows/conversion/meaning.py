@@ -130,14 +130,14 @@ class Meaning:
         return max(motion.end_time for _, motion in nominal_slower_faster)
 
     @property
-    def longest(self) -> float:
+    def longest_time(self) -> float:
         """Time that a run may take. [s]"""
         return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before))
 
     def farthest(self, name: str) -> float:
         """Distance that an entity may drive in that time, as fast as in the run in which it is fastest. [m]"""
         runs = (one for _, motion in self._before for one in motion.entities if one.name == name)
-        return self.longest * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
+        return self.longest_time * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
 
     def _runs(self, scenario: Scenario) -> Iterator[tuple[Scenario, NominalMotion]]:
         """Each run and what was played; all but the nominal one in coarser steps, until nothing is left to happen."""
@@ -165,15 +165,15 @@ class Meaning:
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            found = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
-            if found.changes:
+            matches = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
+            if matches.changes:
                 chance = self._by_chance(driven, nominal, trajectories)
-                others = (one for one in found.changes if abs(one.size) > chance.get(one.what, 0.0))
-                found = structs.replace(found, changes=tuple(others))
+                others = (one for one in matches.changes if abs(one.size) > chance.get(one.what, 0.0))
+                matches = structs.replace(matches, changes=tuple(others))
             movement = changed_movement(network, before, run, moved)
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
-            changes = tuple(structs.replace(one, run=name) for one in (*found.changes, *movement))
-            shifts = tuple(structs.replace(one, run=name) for one in found.shifts)
+            changes = tuple(structs.replace(one, run=name) for one in (*matches.changes, *movement))
+            shifts = tuple(structs.replace(one, run=name) for one in matches.shifts)
             comparisons.append(Comparison(shifts, changes, shares, name))
         return comparisons, after[0]
 
@@ -224,7 +224,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptMeaning:
     """Paths that leave what happens as it was, the runs with them, and what is left that could not be mended."""
 
     paths: tuple[OffsetPath, ...]
@@ -288,7 +288,7 @@ def keep_meaning(
     paths: Sequence[OffsetPath],
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetPath]], tuple[Output, list[Comparison]]],
-) -> tuple[Output, Kept]:
+) -> tuple[Output, KeptMeaning]:
     """Paths as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
     sizes: Sizes = {}
     trials = 1
@@ -317,7 +317,7 @@ def keep_meaning(
     for name in dict.fromkeys(paths[k].entity for k in sizes):
         theirs = [k for k, path in enumerate(paths) if path.entity == name]
         least[name] = min(sizes.get(k, 1.0) for k in theirs), all(k in sizes for k in theirs)
-    return output, Kept(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
+    return output, KeptMeaning(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Sequence[Comparison]) -> list[Change]:

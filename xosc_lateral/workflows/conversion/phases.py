@@ -49,16 +49,16 @@ def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
     phases = _Phases(entity, plan)
     actions = plan.lateral.by_entity.get(entity.name, ())
     is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
-    found = list[OffsetPath | None]()
+    matches = list[OffsetPath | None]()
     if not plan.lateral.from_the_start.get(entity.name, Domains.NONE):
         is_there = bool(entity.motion.activity[0] & Activity.ACTIVE)
-        found.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
+        matches.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
     if not is_moved_along:
-        found += phases.behind_breaks(found[0] if found else None)
+        matches += phases.behind_breaks(matches[0] if matches else None)
     for action in actions:
         if not action.adds and (action.steers is False or (action.steers is None and not is_moved_along)):
-            found.append(phases.after(action.path))
-    return (path for path in found if path is not None)
+            matches.append(phases.after(action.path))
+    return (path for path in matches if path is not None)
 
 
 class _Phases:
@@ -99,23 +99,23 @@ class _Phases:
 
     def after(self, action: Path) -> OffsetPath | None:
         """From the end of an action in the nominal run, or else as on the longest segment."""
-        ends = [one.end for one in self._own if one.path == action and one.end is not None]
+        ends = [each_one.end for each_one in self._own if each_one.path == action and each_one.end is not None]
         if ends:
             return self._path(action, self._driven_at(min(ends)), 0.0)
-        longest = max(self._entity.segments, key=lambda one: one.span.end - one.span.start)
+        longest = max(self._entity.segments, key=lambda each_one: each_one.span.end - each_one.span.start)
         return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
 
     def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
         """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
         known: float | None = 0.0 if first is None else first.end
-        actions = [self._driven_at(one.start) for one in self._own if one.path in self._lateral]
-        for one in self._way.breaks:
-            if any(at < one.behind for at in actions):
+        actions = [self._driven_at(each_one.start) for each_one in self._own if each_one.path in self._lateral]
+        for each_one in self._way.breaks:
+            if any(at < each_one.behind for at in actions):
                 known = None
-            path = self._path(None, one.behind, known) if one.lanes else None
+            path = self._path(None, each_one.behind, known) if each_one.lanes else None
             if path is not None:
                 known = None if known is None else path.end
-                yield structs.replace(path, places=one.lanes)
+                yield structs.replace(path, places=each_one.lanes)
 
     def _path(
         self, after: Path | None, begin: float, start: float | None, *, is_nominal: bool = True

@@ -19,7 +19,7 @@ from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, truth_of
 
 ROWS = round(0.2 / STEP)
 """Rows to one of the spectrum's, whose windows are made for 5 Hz. [rows]"""
-SLOWEST = 0.1
+LEAST_FREQUENCY = 0.1
 """Slower movement is seen as it is: lane changes of up to 10 s are made of it, and drivers differ in it. [Hz]"""
 
 
@@ -31,10 +31,10 @@ class Band:
     gain: FloatArray
 
     def at(self, frequency: FloatArray) -> FloatArray:
-        """Gain at frequencies, linear over their logarithm, 1 up to `SLOWEST`."""
+        """Gain at frequencies, linear over their logarithm, 1 up to `LEAST_FREQUENCY`."""
         floor = np.maximum(frequency, 1e-9)
-        inside = np.interp(np.log(floor), np.log(np.r_[SLOWEST, self.frequency]), np.r_[1.0, self.gain])
-        return np.where(frequency <= SLOWEST, 1.0, inside)
+        inside = np.interp(np.log(floor), np.log(np.r_[LEAST_FREQUENCY, self.frequency]), np.r_[1.0, self.gain])
+        return np.where(frequency <= LEAST_FREQUENCY, 1.0, inside)
 
     def seen(self, position: FloatArray) -> FloatArray:
         """A lateral position every `STEP` as it is seen, without delay; shape (n,). [m]
@@ -66,7 +66,7 @@ def keeping_spectrum(tracks: Iterable[LaneTrack], source: str) -> Spectrum:
 
 def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     """What a recording shows of movement like home's: the root of the ratio of both spectra, at most 1."""
-    rows = np.isin(recorded.frequency, home.frequency) & (recorded.frequency > SLOWEST)
+    rows = np.isin(recorded.frequency, home.frequency) & (recorded.frequency > LEAST_FREQUENCY)
     frequency = recorded.frequency[rows]
     density = home.density[np.isin(home.frequency, frequency)]
     with np.errstate(divide="ignore"):

@@ -78,7 +78,7 @@ class Detection(Result):
                 f"Set on a home: the threshold that gives {self.goal.what} there; a source set on itself has, for each "
                 "vehicle, the threshold of other vehicles."
             )
-            carriers = [one for tally in self.tallies if isinstance(one := tally.detector, Carried)]
+            carriers = [each_one for tally in self.tallies if isinstance(each_one := tally.detector, Carried)]
             if missed := not_met(carriers):
                 lines.append(f"No threshold gives that, the nearest is set: {', '.join(missed)}.")
         silent = sorted(self.still)

@@ -109,12 +109,13 @@ def _lane_centre(
     Cubic Hermite pieces through the lane centres at the vehicles, in the lane's direction there.
     """
     pieces = []
-    for one, other in pairwise(rows):
+    for each_one, other in pairwise(rows):
         ends = [
-            np.array([x[k] + offset[k] * np.sin(along[k]), y[k] - offset[k] * np.cos(along[k])]) for k in (one, other)
+            np.array([x[k] + offset[k] * np.sin(along[k]), y[k] - offset[k] * np.cos(along[k])])
+            for k in (each_one, other)
         ]
         chord = float(np.hypot(*(ends[1] - ends[0])))
-        ways = [chord * np.array([np.cos(along[k]), np.sin(along[k])]) for k in (one, other)]
+        ways = [chord * np.array([np.cos(along[k]), np.sin(along[k])]) for k in (each_one, other)]
         u = np.arange(0.0, chord, LANE_STEP)[:, None] / max(chord, LANE_STEP)
         pieces.append(
             (2 * u**3 - 3 * u**2 + 1) * ends[0] + (u**3 - 2 * u**2 + u) * ways[0]
@@ -159,17 +160,17 @@ class Sight(Result):
 
     def bands(self) -> list[dict[str, Any]]:
         """Share of moments at which the second car is seen by its distance, for each source."""
-        found = []
+        matches = []
         for source, moments in self.moments.items():
             number = np.array([one.distance // BAND for one in moments])
             seen = np.array([one.share > 0.0 for one in moments])
             for band in np.unique(number).tolist():
                 inside = number == band
-                found.append({
+                matches.append({
                     "source": source, "from": BAND * band, "to": BAND * (band + 1.0), "moments": int(inside.sum()),
                     "second_seen": round(float(seen[inside].mean()), 6),
                 })  # fmt: skip
-        return found
+        return matches
 
     def to_frame(self) -> pd.DataFrame:
         """One row per source and sensor."""
@@ -200,9 +201,11 @@ class Sight(Result):
         panel.y.limits = (0.0, 100.0)
         bands = self.bands()
         for number, source in enumerate(self.moments):
-            own = [band for band in bands if band["source"] == source]
-            middle = np.array([band["from"] + 0.5 * BAND for band in own])
-            panel.line(middle, np.array([100.0 * band["second_seen"] for band in own]), color_of(number), label=source)
+            own_part = [band for band in bands if band["source"] == source]
+            middle = np.array([band["from"] + 0.5 * BAND for band in own_part])
+            panel.line(
+                middle, np.array([100.0 * band["second_seen"] for band in own_part]), color_of(number), label=source
+            )
         return figure
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
@@ -230,11 +233,13 @@ class Sight(Result):
 
 def sight_of(sources: Sequence[Source], seed: int, files: Sequence[Path]) -> Sight:
     """Look at every source; raises `NotEnoughDataError` where none has a vehicle behind two others."""
-    found = {source.label: [moment for scene in checked(source) for moment in moments_of(scene)] for source in sources}
-    if not any(found.values()):
-        names = ", ".join(found)
+    matches = {
+        source.label: [moment for scene in checked(source) for moment in moments_of(scene)] for source in sources
+    }
+    if not any(matches.values()):
+        names = ", ".join(matches)
         raise NotEnoughDataError(f"{names}: no vehicle has two others ahead in its lane, in places that are known")
-    return Sight(found, sources, seed, files)
+    return Sight(matches, sources, seed, files)
 
 
 def _summary(moments: Sequence[Moment]) -> dict[str, Any]:

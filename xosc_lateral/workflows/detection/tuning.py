@@ -72,7 +72,7 @@ class Home:
     met: bool
     rate: float  # false alarms an hour
     seen: float  # share of cut-ins before the marking; NaN: there are none
-    own: bool = False  # tried on the source itself: each vehicle's threshold comes from other vehicles
+    is_source: bool = False  # tried on the source itself: each vehicle's threshold comes from other vehicles
 
 
 class Carried(Detector):
@@ -84,8 +84,8 @@ class Carried(Detector):
         self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
         self.home_source = home.source
         self.threshold = detector.threshold_of(limit)
-        own = np.array([]) if home.own else detector.limits
-        self._limits = np.unique(np.append(own, limit))
+        own_part = np.array([]) if home.is_source else detector.limits
+        self._limits = np.unique(np.append(own_part, limit))
         self._chosen = int(np.searchsorted(self._limits, limit))
 
     @property
@@ -145,12 +145,12 @@ class Scored:
 
 def scored(detector: Detector, views: Views) -> list[Scored]:
     """Every view that the detector can score."""
-    found = []
+    matches = []
     for scene, several in views:
         usable = detector.usable(several)
         scores = detector.scores(scene, usable)
-        found += [Scored(scene, *each) for each in zip(usable, scores, strict=True)]
-    return found
+        matches += [Scored(scene, *each) for each in zip(usable, scores, strict=True)]
+    return matches
 
 
 def set_at_home(
@@ -161,15 +161,18 @@ def set_at_home(
         trained, at_home = detector, scored(detector, views)
     else:
         trained, at_home = out_of_fold(detector, views, source)
-    own = carried_within(goal, trained, at_home, source) if within else None
-    return carried(goal, trained, at_home, source), own
+    own_part = carried_within(goal, trained, at_home, source) if within else None
+    return carried(goal, trained, at_home, source), own_part
 
 
 def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
     """By detector in the order in which it comes first, then by home."""
     titles = list(dict.fromkeys(tally.detector.title() for tally in tallies))
     order = ["", *homes]
-    return sorted(tallies, key=lambda one: (titles.index(one.detector.title()), order.index(one.detector.home_source)))
+    return sorted(
+        tallies,
+        key=lambda each_one: (titles.index(each_one.detector.title()), order.index(each_one.detector.home_source)),
+    )
 
 
 def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, list[Scored]]:
@@ -178,12 +181,12 @@ def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, 
     Raises `NotEnoughDataError` where fewer than two vehicles change lanes.
     """
     folds = folds_of([view for _, several in views for view in several], source, every_changes=True)
-    found: list[Scored] = []
+    matches: list[Scored] = []
     for fold in sorted(set(folds.values())):
         trained = learner(_outside(views, folds, fold), source)
         held = [(scene, [view for view in several if folds[view.track.cluster] == fold]) for scene, several in views]
-        found += scored(trained, [(scene, several) for scene, several in held if several])
-    return learner((view for _, several in views for view in several), source), found
+        matches += scored(trained, [(scene, several) for scene, several in held if several])
+    return learner((view for _, several in views for view in several), source), matches
 
 
 def _outside(views: Views, folds: Mapping[str, int], fold: int) -> Iterable[View]:
@@ -222,14 +225,16 @@ def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], so
     parts = []
     for fold in sorted(set(folds.values())):
         others = [each for each in at_home if folds[each.view.track.cluster] != fold]
-        one = carried(goal, detector, others, source)
-        tally = Tally(Carried(detector, float(one.limits[one.chosen]), replace(one.home, own=True)), source)
+        each_one = carried(goal, detector, others, source)
+        tally = Tally(
+            Carried(detector, float(each_one.limits[each_one.chosen]), replace(each_one.home, is_source=True)), source
+        )
         for each in at_home:
             if folds[each.view.track.cluster] == fold:
                 tally.count(each.scene, each.view, each.score)
         parts.append(tally)
     every = carried(goal, detector, at_home, source)
-    whole = Tally(Carried(detector, float(every.limits[every.chosen]), replace(every.home, own=True)), source)
+    whole = Tally(Carried(detector, float(every.limits[every.chosen]), replace(every.home, is_source=True)), source)
     for part in parts:
         whole.seconds |= part.seconds
         whole.counts |= part.counts

@@ -22,7 +22,7 @@ from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
-from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, Told
+from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, ToldPlace
 from xosc_lateral.workflows.live.loop import Row
 from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
@@ -175,7 +175,7 @@ class EsminiTraffic:
             if (known := self._ledger.vehicles.get(name)) is None:
                 continue
             if name in busy and known.steered:  # begun in this step, in which the driver's place still counts
-                if known.told is None or self._ledger.apart(known.told, state) > _SAME_PLACE:
+                if known.told_place is None or self._ledger.apart(known.told_place, state) > _SAME_PLACE:
                     continue
                 bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * max(abs(state.speed), MINIMUM_SPEED)
                 known.rest = Rest(known.rate, max(SETTLING_TIME, 4.0 * abs(known.rate) / bound))
@@ -233,7 +233,7 @@ class EsminiTraffic:
         self.player.SE_ReportObjectSpeed(state.id, state.speed)
         self.player.SE_ReportObjectLateralPosition(state.id, t)
         offset_t = state.offset_t + t - state.t
-        self._ledger.vehicles[name].told = Told(self._ledger.road_of(state), state.lane, t, offset_t)
+        self._ledger.vehicles[name].told_place = ToldPlace(self._ledger.road_of(state), state.lane, t, offset_t)
 
     def _say(self, key: tuple[str, str], line: str) -> None:
         """A warning, once for its key."""
@@ -293,25 +293,27 @@ class EsminiTraffic:
         ]
         for name, place in zip(names, places, strict=True):
             if not self._ledger.vehicles[name].steered and (why[name] or not place.is_free):
-                own = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
-                self.undriven[name] = why[name] or own
+                own_part = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
+                self.undriven[name] = why[name] or own_part
             if name not in busy:
                 self._ledger.vehicles[name].rest = None
         self._touched.clear()
         units = {first: k for k, first in enumerate(dict.fromkeys(self._unit.get(name, name) for name in names))}
-        given = {
+        column_at = {
             what: np.array([getattr(place, what) for place in places], dtype=kind)
             for what, kind in (("width", float), ("offset", float), ("base", float), ("heading", float),
                                ("road", np.int64), ("lane", np.int64), ("is_free", np.bool_))
         }  # fmt: skip
         unit = np.array([units[self._unit.get(name, name)] for name in names], dtype=np.int64)
         moment = Moment(
-            names, column["speed"], given["width"], given["offset"], given["is_free"],
+            names, column["speed"], column_at["width"], column_at["offset"], column_at["is_free"],
             np.array([not why[name] for name in names], dtype=np.bool_),
             np.array([state.category in _TRUCK_CATEGORIES for state in seen.values()], dtype=np.bool_),
-            base=given["base"],
-            places=Places(column["x"], column["y"], given["heading"], given["road"], given["lane"], column["s"],
-                          column["length"], column["width"], column["center_x"], unit),
+            base=column_at["base"],
+            places=Places(
+                column["x"], column["y"], column_at["heading"], column_at["road"], column_at["lane"], column["s"],
+                column["length"], column["width"], column["center_x"], unit,
+            ),
         )  # fmt: skip
         return moment, places
 

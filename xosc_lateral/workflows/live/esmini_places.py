@@ -25,7 +25,7 @@ LANE_STEP = 0.5
 MOVED, RESTING = 0.01, 0.2
 """A vehicle farther from where it was told to be is moved by somebody else [m], until it has kept still so long [s]."""
 
-KEPT = 1e-6
+KEPT_PLACE = 1e-6
 """So well does a vehicle keep its place in the lane that nobody moves. [m]"""
 
 
@@ -50,7 +50,7 @@ class Lane(NamedTuple):
     heading: float  # Of travel. [rad]
 
 
-class Told(NamedTuple):
+class ToldPlace(NamedTuple):
     """What the player was told of a vehicle's place."""
 
     road: int
@@ -67,7 +67,7 @@ class Vehicle:
     home: tuple[int, float, int] | None = None  # Road, where its lane section begins [m], lane.
     lane: Lane | None = None
     rest: Rest | None = None
-    told: Told | None = None
+    told_place: ToldPlace | None = None
     foreign: tuple[float, float] | None = None  # Left alone until [s]; offset along t when last seen [m].
     last: tuple[float, int, float] | None = None  # Time [s], road and s [m] a step ago.
     place: float | None = None  # Offset from the home lane's centre that it was given. [m]
@@ -112,12 +112,12 @@ class Ledger:
         ahead = network.pose_at(road, state.lane, state.s).heading + network.header_offset.heading
         return left if np.cos(state.h - ahead) >= 0.0 else -left
 
-    def apart(self, told: Told, state: ObjectState) -> float:
+    def apart(self, reported: ToldPlace, state: ObjectState) -> float:
         """How far a vehicle is from where the player was told to have it, in the road's course or its lane's. [m]"""
-        if told.road != self.road_of(state):
-            return 0.0 if state.lane == told.lane and abs(state.offset_t - told.offset_t) <= MOVED else np.inf
-        apart = abs(state.t - told.t)
-        return float(min(apart, abs(state.offset_t - told.offset_t)) if state.lane == told.lane else apart)
+        if reported.road != self.road_of(state):
+            return 0.0 if state.lane == reported.lane and abs(state.offset_t - reported.offset_t) <= MOVED else np.inf
+        apart = abs(state.t - reported.t)
+        return float(min(apart, abs(state.offset_t - reported.offset_t)) if state.lane == reported.lane else apart)
 
     def room_to_middle(self, state: ObjectState) -> float:
         """How far a vehicle is from lane 0, on the side of the lane that it is on; below 0: it is across. [m]"""
@@ -131,15 +131,15 @@ class Ledger:
         """Where a vehicle is now [s]; `anew`: lane widths and headings are looked up again."""
         known, road = self.vehicles.setdefault(name, Vehicle()), self.road_of(state)
         if in_action:
-            known.told = known.foreign = None
+            known.told_place = known.foreign = None
         is_moved = in_action or self._is_foreign(name, known, state, road, now)
         home = self._home(known, state, road, is_moved)
         if known.lane is None or anew or known.lane.place != (road, home):
             known.lane = self._lane(state, road, home)
         lane, centre = known.lane, state.t - state.offset_t
         if lane.is_lane and home != state.lane:
-            own, its = (self.network.lane_state_at(road, one, state.s).centre_t for one in (home, state.lane))
-            centre += own - its
+            own_part, its = (self.network.lane_state_at(road, one, state.s).centre_t for one in (home, state.lane))
+            centre += own_part - its
         offset = (state.t - centre) * lane.left
         if not is_ours:
             known.base = 0.0
@@ -187,14 +187,14 @@ class Ledger:
 
     def _is_foreign(self, name: str, known: Vehicle, state: ObjectState, road: int, now: float) -> bool:
         """Whether something unknown moves it sideways."""
-        told, foreign = known.told, known.foreign
-        known.told = known.foreign = None
-        if told is not None and told.road == road:
-            if self.apart(told, state) > MOVED:
+        reported, foreign = known.told_place, known.foreign
+        known.told_place = known.foreign = None
+        if reported is not None and reported.road == road:
+            if self.apart(reported, state) > MOVED:
                 foreign = (now + RESTING, state.offset_t)
                 line = f"vehicle {name!r}: moved sideways from {now:.2f} s on, by no lateral action of the scenario"
                 self._say((name, "moved"), f"{line}; it is left alone until that rests")
-        elif foreign is not None and abs(state.offset_t - foreign[1]) > KEPT:
+        elif foreign is not None and abs(state.offset_t - foreign[1]) > KEPT_PLACE:
             foreign = (now + RESTING, state.offset_t)
         if foreign is None or now >= foreign[0]:
             return False

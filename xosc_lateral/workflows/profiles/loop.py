@@ -216,8 +216,8 @@ class ClosedLoop(Result):
         """One line."""
         names = ", ".join(self.findings) or "no effect added"
         error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
-        if (own := self._result.own_errors) is not None:
-            error = f"where they act, error {own[0]:.4f} -> {own[1]:.4f} m; over everything {error}"
+        if (own_part := self._result.own_errors) is not None:
+            error = f"where they act, error {own_part[0]:.4f} -> {own_part[1]:.4f} m; over everything {error}"
         return f"{names}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:

@@ -18,14 +18,19 @@ SHOWN_NOTE = (
 def shown_rows(shown: Sequence[Shown]) -> list[dict[str, str | None]]:
     """What drives can show, as a table in words."""
 
-    def size(one: Shown, value: float | None) -> str | None:
-        return None if value is None else f"{value:.2f}{GAP}m" if one.acts == "mean" else f"factor{GAP}{value:.2f}"
+    def size(each_one: Shown, value: float | None) -> str | None:
+        return None if value is None else f"{value:.2f}{GAP}m" if each_one.acts == "mean" else f"factor{GAP}{value:.2f}"
 
     return [
-        {"look": one.what, "on": one.acts, "tested": "yes" if one.tested else "no", "outcome": one.why}
-        | {"smallest": size(one, one.smallest), "at most": size(one, one.bound)}
-        | {"more minutes": None if one.more_minutes is None else f"{one.more_minutes:.0f}"}
-        for one in shown
+        {
+            "look": each_one.what,
+            "on": each_one.acts,
+            "tested": "yes" if each_one.tested else "no",
+            "outcome": each_one.why,
+        }
+        | {"smallest": size(each_one, each_one.smallest), "at most": size(each_one, each_one.bound)}
+        | {"more minutes": None if each_one.more_minutes is None else f"{each_one.more_minutes:.0f}"}
+        for each_one in shown
     ]
 
 
@@ -50,5 +55,7 @@ def shown_words(shown: Sequence[Shown]) -> str:
         sizes = [one.smallest for one in shown if one.acts == acts and one.smallest is not None]
         words += [form.format(min(sizes), max(sizes))] if sizes else []
     untested = sum(not one.tested for one in shown)
-    found = f"effects from {' and '.join(words)} on, depending on the column, in four of five cases"
-    return f"These drives show {found if words else 'no effect'}; {untested} of {len(shown)} looks could not be taken."
+    matches = f"effects from {' and '.join(words)} on, depending on the column, in four of five cases"
+    return (
+        f"These drives show {matches if words else 'no effect'}; {untested} of {len(shown)} looks could not be taken."
+    )

@@ -67,7 +67,7 @@ def fit_autoregression(
     sums = DriverSums.of(runs, order, every=every, drivers=drivers)
     sizes, parameters = np.ones(len(sums.count)), sums.start()
     for _ in range(PASSES):
-        parameters, ended = _highest(sums, parameters, sizes)
+        parameters, ended = _maximise_likelihood(sums, parameters, sizes)
         coefficients, ratio = sums.unpack(parameters)
         residual = sums.residuals(coefficients)
         usual, weights = float(np.median(residual)), sums.weighted(sizes)
@@ -170,7 +170,7 @@ class DriverSums:
         return np.asarray(np.maximum(squares / self.count + gone**2, 1e-300))
 
 
-def _highest(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[FloatArray, bool]:
+def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[FloatArray, bool]:
     """Parameters of the largest likelihood near those, and whether it was found."""
     from scipy.optimize import minimize
 
@@ -182,7 +182,7 @@ def _highest(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[Fl
     def slope(parameters: FloatArray) -> FloatArray:
         return np.array([cost(parameters + step) - cost(parameters - step) for step in steps]) / (2.0 * NUDGE)
 
-    found = minimize(
+    matches = minimize(
         cost,
         start,
         method="L-BFGS-B",
@@ -190,9 +190,11 @@ def _highest(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[Fl
         bounds=[(-FARTHEST, FARTHEST)] * len(start),
         options={"maxiter": MAXIMUM_TURNS, "gtol": FLATNESS, "ftol": 0.0},
     )
-    bends = np.array([slope(found.x + 10.0 * step) - slope(found.x - 10.0 * step) for step in steps]) / (20.0 * NUDGE)
+    bends = np.array([slope(matches.x + 10.0 * step) - slope(matches.x - 10.0 * step) for step in steps]) / (
+        20.0 * NUDGE
+    )
     inverse = np.linalg.pinv(bends + bends.T, rcond=FLATNESS, hermitian=True)
-    best = np.asarray(found.x)
+    best = np.asarray(matches.x)
     for _ in range(LAST_STEPS):
         best = best - 2.0 * inverse @ slope(best)
     return best, bool(np.abs(slope(best)).max() < 10.0 * FLATNESS)
@@ -200,11 +202,11 @@ def _highest(sums: DriverSums, start: FloatArray, sizes: FloatArray) -> tuple[Fl
 
 def partial_autocorrelations(coefficients: FloatArray) -> FloatArray:
     """Of a stable autoregression, shape (order,). [-]"""
-    found = np.empty(len(coefficients))
+    matches = np.empty(len(coefficients))
     for k in reversed(range(len(coefficients))):
-        found[k] = last = coefficients[-1]
+        matches[k] = last = coefficients[-1]
         coefficients = (coefficients[:-1] + last * coefficients[:-1][::-1]) / (1.0 - last**2)
-    return found
+    return matches
 
 
 def first_precision(coefficients: FloatArray) -> FloatArray:

@@ -135,15 +135,17 @@ class BetweenSpreadTerm(ColumnTerm):
 
 def whole_drive_columns(search: Search) -> dict[str, FloatArray]:
     """Columns that may act and are constant in every drive, shape (drives,), in their units; NaN: a drive too short."""
-    coarse, found = search.coarse, {}
+    coarse, matches = search.coarse, {}
     inside, lasting = coarse.timeline.valid, counted(coarse) > 0.0
     for name, column in search.columns.items():
-        own = [coarse.context[name][span][inside[span]] for span in coarse.timeline.spans]
-        known = [values for values, lasts in zip(own, lasting, strict=True) if lasts]
+        own_part = [coarse.context[name][span][inside[span]] for span in coarse.timeline.spans]
+        known = [values for values, lasts in zip(own_part, lasting, strict=True) if lasts]
         if column.period or not all(np.isfinite(values).all() and np.ptp(values) == 0.0 for values in known):
             continue
-        found[name] = np.array([values[0] if lasts else np.nan for values, lasts in zip(own, lasting, strict=True)])
-    return found
+        matches[name] = np.array(
+            [values[0] if lasts else np.nan for values, lasts in zip(own_part, lasting, strict=True)]
+        )
+    return matches
 
 
 def can_be_told(values: FloatArray) -> bool:
@@ -157,13 +159,13 @@ def between_drives(fitted: Fitted, kind: type[ColumnTerm], values: FloatArray) -
     coarse, seconds = fitted.coarse, counted(fitted.coarse)
     rows = (seconds > 0.0) & np.isfinite(values)
     if kind is BetweenTerm:
-        own, noise = fitted.levels, 1.0 / np.maximum(fitted.whitener.power, 1e-300)
+        own_part, noise = fitted.levels, 1.0 / np.maximum(fitted.whitener.power, 1e-300)
     else:
         _, scales, known = design_of(coarse, fitted.terms)
-        own = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
+        own_part = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
         squares = clipped_squares(fitted.innovations, coarse.valid)[coarse.valid]
         noise = 0.25 * float(squares.var() / squares.mean() ** 2) / np.maximum(seconds, 1.0)
-    return regress(own[rows], noise[rows], values[rows])
+    return regress(own_part[rows], noise[rows], values[rows])
 
 
 def _best_of_whole_drives(kind: type[ColumnTerm], search: Search, fitted: Fitted) -> Outcome | None:

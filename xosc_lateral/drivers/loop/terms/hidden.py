@@ -280,14 +280,15 @@ def line(rows: FloatArray, valid: BoolArray, drive: IndexArray, rng: np.random.G
         sizes = [np.maximum(np.square(values[:, span]).sum(axis=1), 1e-300)[:, None] for span in spans]
         sums = np.cumsum(np.pad(np.sum(np.divide(powers, sizes), axis=0), ((0, 0), (beyond + 1, beyond))), axis=1)
 
-        def near(half: int) -> FloatArray:
+        def window_sum(half: int) -> FloatArray:
             middle = beyond + 1 + np.flatnonzero(band)
             return np.asarray(sums[:, middle + half] - sums[:, middle - half - 1])
 
-        own = [min(width // 2 + LINE_MARGIN, beyond - 1) for width in WIDTHS]
+        own_part = [min(width // 2 + LINE_MARGIN, beyond - 1) for width in WIDTHS]
         return [
-            near(width // 2) / np.maximum((near(beyond) - near(gap)) / (2 * (beyond - gap)) * width, 1e-300)
-            for width, gap in zip(WIDTHS, own, strict=True)
+            window_sum(width // 2)
+            / np.maximum((window_sum(beyond) - window_sum(gap)) / (2 * (beyond - gap)) * width, 1e-300)
+            for width, gap in zip(WIDTHS, own_part, strict=True)
         ]
 
     seen = ratios(rows[None])
