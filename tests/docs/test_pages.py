@@ -53,6 +53,11 @@ NOT_RUN = {
     ("docs/how_to/detect.md", "xosc-lateral detect recording.csv"): RECORDING,
     ("docs/how_to/detect.md", "xosc-lateral detect out/cut-in.xosc drives.csv"): "a detector of the reader's own",
     ("docs/how_to/detect.md", '{"time"'): EXCERPT,
+    (
+        "docs/how_to/detect.md",
+        "xosc-lateral detect dense-traffic.xosc --sight",
+    ): "minutes of rays; `test_sight` runs it",
+    ("docs/design/offset_chains.md", "<Vertex"): EXCERPT,
     ("docs/how_to/esmini.md", "esmini --window"): SIMULATOR,
     ("docs/how_to/esmini.md", "esmini --headless"): SIMULATOR,
     ("docs/how_to/from_a_recording.md", "xosc-lateral reconstruct tasi"): RECORDING,

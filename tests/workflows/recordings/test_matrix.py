@@ -125,7 +125,6 @@ def test_tracks_of_the_other_side_or_mirrored_are_refused(case: Case, tmp_path: 
         ("speed", lambda h: 108.0 + 0.0 * h, "in km/h: speed=COLUMN:km/h"),
         ("speed", lambda h: 67.1 + 0.0 * h, "in mph"),
         ("time", lambda t: 1000.0 * t, "may be in ms"),
-        ("time", lambda t: 1.7e12 + 1000.0 * t, "may be in ms"),
         ("vehicle_class", lambda t: 2 + 0.0 * t, r"numbers such as 2: \[values.vehicle_class\]"),
         ("length", lambda t: np.where(np.arange(len(t)) % 7, 4.5, -9999.0), r"missing = \[-9999\]"),
     ],

@@ -179,7 +179,7 @@ def test_a_run_of_sumo_drives_on_its_own_network(tmp_path, left_handed, packed):
     assert [(row["entity"], row["kind"], row["side"]) for row in made.to_dict()["maneuvers"]] == [
         ("car", "lane change", side)
     ]
-    assert {row["entity"]: row["class"] for row in made.to_dict()["vehicles"]} == {"car": "", "big": "truck"}
+    assert {row["entity"]: row["class"] for row in made.to_dict()["vehicles"]} == {"car": "car", "big": "truck"}
     played = xl.play(tmp_path / "out/run.xosc").to_frame()
     for name, length in (("car", 5.0), ("big", 7.1)):
         rows, true = played[played["name"] == name], truth[truth["name"] == name]

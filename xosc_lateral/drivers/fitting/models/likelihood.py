@@ -138,7 +138,9 @@ class DriverSums:
         inverse = first_precision(coefficients)
         weights, gone = inverse.sum(axis=0), 1.0 - float(coefficients.sum())
         shocks = self.totals[:, 0] - self.totals[:, 1:] @ coefficients
-        return self.runs * weights.sum() + self.count * gone**2, self.first_totals @ weights + gone * shocks, inverse
+        # never negative but by rounding, where a model hardly forgets
+        precision = np.maximum(self.runs * weights.sum() + self.count * gone**2, np.finfo(np.float64).tiny)
+        return precision, self.first_totals @ weights + gone * shocks, inverse
 
     def cost(self, parameters: FloatArray, weighted: tuple[FloatArray, FloatArray, FloatArray]) -> float:
         """Minus twice the restricted log likelihood per moment and a constant, the residual's variance at its best."""
