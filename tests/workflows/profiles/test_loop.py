@@ -128,7 +128,8 @@ def test_what_would_explain_as_much_is_said_by_its_columns(result: LoopResult) -
 def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
     sections = re.findall(r"<h2[^>]*>([^<]+)", page)
     assert sections == [
-        "What the profile lacked", "Residual by context", "Movement", "What these drives can show", "Consequences of the car&#x27;s own movement",
+        "What the profile lacked", "Residual by context", "Movement", "What these drives can show",
+        "Consequences of the car&#x27;s own movement",
         "Tested and rejected", "Columns, and what they are taken for", "How to read this page",
     ]  # fmt: skip
     assert "the mean of 24 simulated runs" in page  # counted, not typed

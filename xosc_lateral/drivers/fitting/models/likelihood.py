@@ -35,6 +35,8 @@ RIDGE = 1e-7
 PASSES = 2
 """The first finds the drivers' sizes, the second is weighted by them. [-]"""
 
+IMPOSSIBLE_COST = 1e6
+"""Of parameters whose likelihood can't be told: beyond any other, so that the search turns back. [-]"""
 MAXIMUM_TURNS = 200
 """Of the search for the largest likelihood. [-]"""
 
@@ -138,14 +140,17 @@ class DriverSums:
         inverse = first_precision(coefficients)
         weights, gone = inverse.sum(axis=0), 1.0 - float(coefficients.sum())
         shocks = self.totals[:, 0] - self.totals[:, 1:] @ coefficients
-        # never negative but by rounding, where a model hardly forgets
-        precision = np.maximum(self.runs * weights.sum() + self.count * gone**2, np.finfo(np.float64).tiny)
+        # at least what its terms are rounded to: where a model hardly forgets, they cancel
+        rounded = np.finfo(np.float64).eps * self.runs * np.abs(weights).sum()
+        precision = np.maximum(self.runs * weights.sum() + self.count * gone**2, rounded)
         return precision, self.first_totals @ weights + gone * shocks, inverse
 
     def cost(self, parameters: FloatArray, weighted: tuple[FloatArray, FloatArray, FloatArray]) -> float:
         """Minus twice the restricted log likelihood per moment and a constant, the residual's variance at its best."""
-        variance, logs, moments = self.terms(parameters, weighted)
-        return float(np.log(moments * variance / weighted[0][0, 0])) + logs / moments
+        with np.errstate(all="ignore"):  # at the edge of what is stationary, sums of rounded numbers may be negative
+            variance, logs, moments = self.terms(parameters, weighted)
+            cost = float(np.log(moments * variance / weighted[0][0, 0])) + logs / moments
+        return cost if np.isfinite(cost) else IMPOSSIBLE_COST
 
     def terms(
         self, parameters: FloatArray, weighted: tuple[FloatArray, FloatArray, FloatArray]
