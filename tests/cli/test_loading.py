@@ -40,7 +40,17 @@ def loaded(words: list[str], folder: Path) -> set[str]:
 def test_nothing_is_loaded_to_say_what_there_is(words: list[str], tmp_path: Path) -> None:
     modules = loaded(words, tmp_path)
     own = {name for name in modules if name.startswith("xosc_lateral.")}
-    light = {"base", "base.errors", "base.limits", "base.names", "base.signals", "base.version", "cli", "files", "files.source"}
+    light = {
+        "base",
+        "base.errors",
+        "base.limits",
+        "base.names",
+        "base.signals",
+        "base.version",
+        "cli",
+        "files",
+        "files.source",
+    }
     assert own == {f"xosc_lateral.{name}" for name in light}
     assert not modules & {*HEAVY, "numpy", "lxml", "msgspec", "pydantic"}
 

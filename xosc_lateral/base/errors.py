@@ -16,9 +16,13 @@ class XoscLateralError(Exception):
         return printable(super().__str__())
 
 
+NO_BREAK_SPACES = "\u00a0\u202f"
+"""Between a number and its unit; Python counts no blank but U+0020 as printable."""
+
+
 def printable(text: str) -> str:
     """Text without signs that steer a terminal or turn the direction of reading; they appear as escapes."""
-    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
+    return "".join(sign if sign.isprintable() or sign in NO_BREAK_SPACES else ascii(sign)[1:-1] for sign in text)
 
 
 class FormatError(XoscLateralError, ValueError):
