@@ -131,7 +131,7 @@ def attack_fmu(count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fa
     import fmpy
 
     unit, at = folder / "driver.fmu", 0.0
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     if not export_fmu(read_profile("motorway"), unit):
         return
     described = fmpy.read_model_description(str(unit))
