@@ -38,7 +38,7 @@ def only_finding(result: LoopResult, kind: str, columns: tuple[str, ...]) -> Fin
 def assert_closed(result: LoopResult, finding: Finding, size: float) -> None:
     """Named, sized within three of its own standard errors, and better where it was not fitted."""
     assert abs(finding.size_m - size) < 3.0 * finding.size_error
-    assert finding.error_after < 0.75 * finding.error_before
+    assert finding.error_after < 0.85 * finding.error_before  # over everything; of a weave, what is not periodic stays
     assert result.error_after < result.error_before
     assert result.error_after < NEAR * result.floor
 
