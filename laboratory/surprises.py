@@ -17,9 +17,8 @@ import numpy as np
 
 import xosc_lateral as xl
 from tests.kit.compiled import CompiledDriver
-from xosc_lateral.drivers.model.seeds import child
+from tests.kit.stepped import stepped_offsets
 from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
 
 STEP, SECONDS, AT = 0.05, 30.0, 15.0
 USUAL = {"lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}
@@ -30,13 +29,6 @@ STEPS: dict[str, tuple[float, ...]] = {
 """What a column steps to."""
 
 
-class Numbered(Traffic):
-    """Vehicles whose names are seeds; their drivers are those that `sample` gives for them."""
-
-    def seed_of(self, name: str) -> np.random.SeedSequence:
-        return child(np.random.SeedSequence(int(name)), 0)
-
-
 def usual(column: str, speed: float) -> float:
     """Value of a column before it steps."""
     return speed if column == "speed" else USUAL.get(column, np.inf if column.endswith("_distance") else 0.0)
@@ -44,18 +36,12 @@ def usual(column: str, speed: float) -> float:
 
 def offsets(profile: xl.DriverProfile, seeds: int, column: str, to: float, speed: float) -> np.ndarray:
     """Of all drivers in Python at every step, shape (n, seeds). [m]"""
-    traffic, names = Numbered(profile), tuple(map(str, range(1, seeds + 1)))
-    offset, yes, rows = np.zeros(seeds), np.ones(seeds, dtype=bool), []
-    for k in range(round(SECONDS / STEP) + 1):
-        stepped = {column: to} if k * STEP >= AT else {}
-        values = {name: stepped.get(name, usual(name, speed)) for name in inputs_of(profile)}
-        context = {name: np.full(seeds, value) for name, value in values.items()}
-        others = {name: own for name, own in context.items() if name not in ("speed", "lane_width", "is_truck")}
-        truck = yes if values.get("is_truck") else ~yes
-        moment = Moment(names, context["speed"], context["lane_width"], offset, yes, yes, truck, context=others)
-        offset = traffic.step(k * STEP, moment).offset
-        rows.append(offset)
-    return np.array(rows)
+    columns = inputs_of(profile)
+
+    def context_at(time: float) -> dict[str, float]:
+        return {name: to if name == column and time >= AT else usual(name, speed) for name in columns}
+
+    return stepped_offsets(profile, seeds, round(SECONDS / STEP), STEP, context_at)[0]
 
 
 def compiled(driver: CompiledDriver, seeds: int, column: str, to: float, speed: float) -> np.ndarray:

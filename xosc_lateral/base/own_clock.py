@@ -55,12 +55,12 @@ def ticks_of(time: FloatArray, speed: FloatArray, step: float) -> tuple[FloatArr
     """Own time of each row, shape (n,); own times a step [s] apart from the first row to behind the last, at least two;
     and the rows that are nearest to these. From rows of time [s] and speed [m/s], shape (n,).
     """
-    own_part = own_time(time, speed)
-    ticks = step * np.arange(max(np.ceil(own_part[-1] / step - 1e-9), 1.0) + 1.0)
-    moved = np.flatnonzero(np.diff(own_part, prepend=-1.0) > 0.0)  # of the rows in one place the first
-    nearest = np.rint(np.interp(ticks, own_part[moved], moved)).astype(np.int64)
-    nearest[-1] = len(own_part) - 1
-    return own_part, ticks, nearest
+    own_times = own_time(time, speed)
+    ticks = step * np.arange(max(np.ceil(own_times[-1] / step - 1e-9), 1.0) + 1.0)
+    moved = np.flatnonzero(np.diff(own_times, prepend=-1.0) > 0.0)  # of the rows in one place the first
+    nearest = np.rint(np.interp(ticks, own_times[moved], moved)).astype(np.int64)
+    nearest[-1] = len(own_times) - 1
+    return own_times, ticks, nearest
 
 
 def within_heading(offset: FloatArray, distance: FloatArray) -> FloatArray:

@@ -35,7 +35,7 @@ def fit(
     usual = options["name"] or tables[0].name.split(".")[0]
     (written,) = reply.claim(tables, profile=(output, f"{usual}.json"))
     options["name"] = options["name"] or (usual if written is None else written.stem)
-    with catch_warnings(record=True) as reported:
+    with catch_warnings(record=True) as caught:
         simplefilter("always", UserWarning)
         profile = xl.fit(tables, **options)
     if written is None:
@@ -44,7 +44,7 @@ def fit(
         xl.write_profile(profile, written, force=reply.force)
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
-    warn([*(str(one.message) for one in reported), *fit_warnings(profile, options.get("sensor_noise"))])
+    warn([*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))])
 
 
 @command(

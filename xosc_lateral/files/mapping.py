@@ -248,24 +248,24 @@ def standard_sources(
     for header in whole.values():
         stem, unit = parts_of(header.strip())
         bare.setdefault(stem, (header, unit))
-    matches = {}
+    sources = {}
     for name, usual in names.items():
         for header in usual:
             if header in whole:
-                matches[name] = ColumnSource(whole[header])
+                sources[name] = ColumnSource(whole[header])
             elif header in bare:
                 column, unit = bare[header]
                 try:
-                    matches[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
+                    sources[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
                 except ValueError as error:
                     if "[" in column or "(" in column:
                         raise FormatError(str(error), path=path, element=f"column {column!r}") from error
             elif strange := next((text for text in whole.values() if re.match(rf"{header}\s*\[", text, re.I)), None):
                 what = f"unknown unit; known: {', '.join(UNITS)}: --map {name}=COLUMN:UNIT names it"
                 raise FormatError(what, path=path, element=f"column {strange!r}")
-            if name in matches:
+            if name in sources:
                 break
-    return matches
+    return sources
 
 
 def read_mapping(path: Path) -> TableMapping:

@@ -169,28 +169,26 @@ def _zstd(file: IO[bytes]) -> Any:
     return pa.CompressedInputStream(pa.PythonFile(file, mode="r"), "zstd")
 
 
-def frame_of(supplied: Any) -> pd.DataFrame:
+def frame_of(table: Any) -> pd.DataFrame:
     """Whatever holds columns as a data frame: Arrow's stream or pandas' interchange protocol, lazy frames of dask and
     polars, a dict of arrays; times in the index become a column. Raises `TypeError`.
     """
-    if not isinstance(supplied, pd.DataFrame):
+    if not isinstance(table, pd.DataFrame):
         for lazy in ("compute", "collect"):
-            supplied = (
-                getattr(supplied, lazy)() if hasattr(supplied, lazy) and not isinstance(supplied, dict) else supplied
-            )
-    if isinstance(supplied, dict):
-        supplied = pd.DataFrame(supplied)
-    elif not isinstance(supplied, pd.DataFrame) and hasattr(supplied, "__arrow_c_stream__"):
+            table = getattr(table, lazy)() if hasattr(table, lazy) and not isinstance(table, dict) else table
+    if isinstance(table, dict):
+        table = pd.DataFrame(table)
+    elif not isinstance(table, pd.DataFrame) and hasattr(table, "__arrow_c_stream__"):
         import pyarrow as pa
 
-        supplied = pa.table(supplied).to_pandas()
-    elif not isinstance(supplied, pd.DataFrame) and hasattr(supplied, "__dataframe__"):
-        supplied = pd.api.interchange.from_dataframe(supplied)
-    if not isinstance(supplied, pd.DataFrame):
-        raise TypeError(f"no table: {type(supplied).__name__}; a path, a data frame or a dict of columns is read")
-    if "time" not in supplied.columns and isinstance(supplied.index, pd.DatetimeIndex | pd.TimedeltaIndex):
-        return supplied.reset_index(names="time")
-    return supplied
+        table = pa.table(table).to_pandas()
+    elif not isinstance(table, pd.DataFrame) and hasattr(table, "__dataframe__"):
+        table = pd.api.interchange.from_dataframe(table)
+    if not isinstance(table, pd.DataFrame):
+        raise TypeError(f"no table: {type(table).__name__}; a path, a data frame or a dict of columns is read")
+    if "time" not in table.columns and isinstance(table.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+        return table.reset_index(names="time")
+    return table
 
 
 def text_encoding(path: Path) -> str:

@@ -69,6 +69,25 @@ def write_page(
     return write_atomically(output, html())
 
 
+def write_table(
+    path: PathLike,
+    usual_name: str,
+    frame: Callable[[], pd.DataFrame],
+    provenance: Callable[[], Mapping[str, Any]],
+    *,
+    inputs: Iterable[Path] = (),
+    force: bool = False,
+) -> Path:
+    """Write a table with its provenance beside it, if need be into a folder; made only if it may be written there."""
+    from xosc_lateral.files.output_paths import claim, output_file
+    from xosc_lateral.files.output_tables import output_suffixes, write_frame
+
+    output = output_file(path, usual_name, output_suffixes())
+    claim([output], inputs, force=force)
+    write_frame(frame(), output, provenance())
+    return output
+
+
 __all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]
 
 DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"

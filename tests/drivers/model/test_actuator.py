@@ -9,40 +9,26 @@ import numpy as np
 import pytest
 
 from tests.kit.compiled import CompiledDriver
+from tests.kit.stepped import stepped_offsets
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.model.actuator import drivable_step, fault_in_words, pay_off, stopping_speed
 from xosc_lateral.drivers.model.effects import Step
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.files.profiles import read_profile, write_profile
 from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.live.traffic import Traffic
 
 STEP = 0.05
 USUAL = {"speed": 33.0, "lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}
 SEEDS = 30
 
 
-class Numbered(Traffic):
-    """Names are seeds of `sample`."""
-
-    def seed_of(self, name: str) -> np.random.SeedSequence:
-        return child(np.random.SeedSequence(int(name)), 0)
-
-
 def driven(profile: DriverProfile, seconds: float, at: float, **stepped: float) -> tuple[np.ndarray, Traffic]:
     """Offsets of `SEEDS` drivers, shape (n, SEEDS) [m], some of whose columns step at a time [s]."""
-    traffic, names = Numbered(profile), tuple(map(str, range(1, SEEDS + 1)))
-    yes, offset, rows = np.ones(SEEDS, dtype=bool), np.zeros(SEEDS), []
-    for k in range(round(seconds / STEP) + 1):
-        values = {name: USUAL.get(name, np.inf) for name in inputs_of(profile)} | (stepped if k * STEP >= at else {})
-        context = {name: np.full(SEEDS, value) for name, value in values.items()}
-        others = {name: own for name, own in context.items() if name not in ("speed", "lane_width", "is_truck")}
-        truck = yes if values.get("is_truck") else ~yes
-        moment = Moment(names, context["speed"], context["lane_width"], offset, yes, yes, truck, context=others)
-        offset = traffic.step(k * STEP, moment).offset
-        rows.append(offset)
-    return np.array(rows), traffic
+    usual = {name: USUAL.get(name, np.inf) for name in inputs_of(profile)}
+    return stepped_offsets(
+        profile, SEEDS, round(seconds / STEP), STEP, lambda time: usual | (stepped if time >= at else {})
+    )
 
 
 STEPPED: list[dict[str, float]] = [

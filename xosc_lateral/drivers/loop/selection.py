@@ -176,12 +176,12 @@ def failed(what: str, error: Exception) -> str:
 
 def _that_can_be_told(selection: Selection) -> Selection:
     """Less what can't be sized or described: one faulty effect must not cost the others."""
-    for each_one in selection.accepted:
-        alone = fit_model(selection.final.coarse, [*selection.start.terms, each_one.term])
+    for accepted in selection.accepted:
+        alone = fit_model(selection.final.coarse, [*selection.start.terms, accepted.term])
         try:
-            each_one.term.describe(alone, each_one.term.estimate(alone), "")
+            accepted.term.describe(alone, accepted.term.estimate(alone), "")
         except UNFORESEEN as error:
-            selection = selection.without([each_one.term], failed("its description", error))
+            selection = selection.without([accepted.term], failed("its description", error))
     return selection
 
 

@@ -87,7 +87,7 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
     left = beside(known, problem.observed)
     noise, compact = unit * float(left.std()), problem.whitener.compact
     seconds = np.flatnonzero(problem.whitener.valid)
-    matches = {name for term in fitted.terms if term.component == kind.component for name in term.columns}
+    named = {name for term in fitted.terms if term.component == kind.component for name in term.columns}
     entries: dict[str, list[tuple[float, float, float]]] = {}
     for index, candidate in enumerate(search.quantities.candidates):
         if candidate.family is not Family.PLAIN:
@@ -105,11 +105,11 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
                 reach = float(high - low if high > low else np.ptp(moved))
                 error, size = reach * noise / np.sqrt(power), reach * unit * float(rows @ left) / power
                 entries.setdefault(candidate.columns[0], []).append((error, size, candidate.cost))
-    for name, own_part in sorted(entries.items()):
-        errors, sizes, costs = np.array(own_part).T
+    for name, timings in sorted(entries.items()):
+        errors, sizes, costs = np.array(timings).T
         smallest = SIZE_MARGIN * float(np.median(errors * (np.sqrt(np.maximum(critical + costs, 0.0)) + POWER_Z)))
         bound = BOUND_MARGIN * float(np.max(np.abs(sizes) + BOUND_Z * errors))
-        if name in matches:
+        if name in named:
             yield Shown(name, acts, True, "found")
         else:
             yield _entry(fitted, name, acts, "not found", smallest, bound)
@@ -164,8 +164,8 @@ def _of_time(search: Search, fitted: Fitted) -> Iterator[Shown]:
     single = coarse.drives == 1 and coarse.lasts
     why = "not found" if single else "several drives have no common step" if coarse.drives > 1 else "under ten minutes"
     yield Shown("step", "mean", single, why)
-    matches = "found" if "cycle" in there else "not found; 0.12 m is found on 9 of 10 sets of short drives"
-    yield Shown("cycle", "mean", bool((seconds > 0.0).any()), matches)
+    outcome = "found" if "cycle" in there else "not found; 0.12 m is found on 9 of 10 sets of short drives"
+    yield Shown("cycle", "mean", bool((seconds > 0.0).any()), outcome)
     why = "found" if "regimes" in there else "not found" if coarse.lasts else "needs a drive of ten minutes"
     yield Shown("regimes", "spread", coarse.lasts, why)
     products = any(one.family is Family.PRODUCT for one in search.quantities.candidates)

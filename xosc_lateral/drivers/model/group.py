@@ -258,16 +258,16 @@ class OffsetGroup:
             drawn = state["drawn"][drivers, at].T
             state["at"][drivers] = at + 1
             state["left"][drivers] -= 1
-            own_part = (part if acts else None for part, acts in zip(drawn[2:], self._hidden, strict=True))
-            return Movement(state["mean"][drivers], drawn[0], drawn[1]), EffectTerms(*own_part)
+            hidden = (part if acts else None for part, acts in zip(drawn[2:], self._hidden, strict=True))
+            return Movement(state["mean"][drivers], drawn[0], drawn[1]), EffectTerms(*hidden)
         moves, hides = [], []  # what the rate of mean reversion acts on can't be drawn ahead
         for k, index in enumerate(drivers.tolist()):
             hides.append(self._drives[index].hidden_terms_at(state["row"][index : index + 1]))
             rate = combine([hides[k], *(effect.rows(slice(k, k + 1)) for effect in effects)]).rate
             moves.append([np.ravel(part)[:1] for part in self._drives[index].movement(1, rate)])
         parts = zip(*(terms.parts for terms in hides), strict=True)
-        own_part = (None if part[0] is None else np.concatenate(part) for part in parts)
-        return Movement(*map(np.concatenate, zip(*moves, strict=True))), EffectTerms(*own_part)
+        hidden = (None if part[0] is None else np.concatenate(part) for part in parts)
+        return Movement(*map(np.concatenate, zip(*moves, strict=True))), EffectTerms(*hidden)
 
     def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""

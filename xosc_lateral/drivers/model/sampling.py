@@ -125,10 +125,10 @@ def sample_offsets(
     if len(time) < 2 or not is_slow(speed).any():
         return sampler.sample(segment, start=start)
     step = float(time[1] - time[0])
-    own_part, _, rows = ticks_of(time, speed, step)
+    own_times, _, rows = ticks_of(time, speed, step)
     samples = sampler.sample(segment.at(np.append(rows, rows[-1])), start=start)
     samples = np.append(extrapolate(samples[1], samples[0]), samples)
-    at = np.minimum(own_part / step, len(rows) - 1.0)
+    at = np.minimum(own_times / step, len(rows) - 1.0)
     first = np.minimum(at.astype(np.int64), len(rows) - 2)
     powers = (at - first)[:, None] ** np.arange(6)
     offset = (np.stack(piece(*(samples[first + k] for k in range(4))), axis=1) * powers).sum(axis=1)

@@ -165,15 +165,15 @@ class Meaning:
             kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
             ends = run is after[0] or not gone  # else stories that others wait for may be gone
             nominal = replace(before, actions=tuple(kept))
-            matches = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
-            if matches.changes:
+            comparison = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
+            if comparison.changes:
                 chance = self._by_chance(driven, nominal, trajectories)
-                others = (one for one in matches.changes if abs(one.size) > chance.get(one.what, 0.0))
-                matches = structs.replace(matches, changes=tuple(others))
+                others = (one for one in comparison.changes if abs(one.size) > chance.get(one.what, 0.0))
+                comparison = structs.replace(comparison, changes=tuple(others))
             movement = changed_movement(network, before, run, moved)
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
-            changes = tuple(structs.replace(one, run=name) for one in (*matches.changes, *movement))
-            shifts = tuple(structs.replace(one, run=name) for one in matches.shifts)
+            changes = tuple(structs.replace(one, run=name) for one in (*comparison.changes, *movement))
+            shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
             comparisons.append(Comparison(shifts, changes, shares, name))
         return comparisons, after[0]
 

@@ -99,9 +99,9 @@ def _over_window(entity: EntityMotion, values: FloatArray) -> FloatArray:
 def _roads(network: RoadNetwork, entity: EntityMotion) -> list[tuple[int, int]]:
     """Roads that are none of a junction, in order, each with the row in which it is entered."""
     rows = np.flatnonzero(np.diff(entity.road, prepend=-2) != 0)
-    matches: list[tuple[int, int]] = []
+    entries: list[tuple[int, int]] = []
     for row in rows.tolist():
         road = int(entity.road[row])
-        if road >= 0 and network.roads[road].junction is None and (not matches or matches[-1][0] != road):
-            matches.append((road, row))
-    return matches
+        if road >= 0 and network.roads[road].junction is None and (not entries or entries[-1][0] != road):
+            entries.append((road, row))
+    return entries

@@ -49,16 +49,16 @@ def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
     phases = _Phases(entity, plan)
     actions = plan.lateral.by_entity.get(entity.name, ())
     is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
-    matches = list[OffsetPath | None]()
+    paths = list[OffsetPath | None]()
     if not plan.lateral.from_the_start.get(entity.name, Domains.NONE):
         is_there = bool(entity.motion.activity[0] & Activity.ACTIVE)
-        matches.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
+        paths.append(phases.from_the_start(next((one.path for one in actions if one.adds and not is_there), None)))
     if not is_moved_along:
-        matches += phases.behind_breaks(matches[0] if matches else None)
+        paths += phases.behind_breaks(paths[0] if paths else None)
     for action in actions:
         if not action.adds and (action.steers is False or (action.steers is None and not is_moved_along)):
-            matches.append(phases.after(action.path))
-    return (path for path in matches if path is not None)
+            paths.append(phases.after(action.path))
+    return (path for path in paths if path is not None)
 
 
 class _Phases:
@@ -99,23 +99,23 @@ class _Phases:
 
     def after(self, action: Path) -> OffsetPath | None:
         """From the end of an action in the nominal run, or else as on the longest segment."""
-        ends = [each_one.end for each_one in self._own if each_one.path == action and each_one.end is not None]
+        ends = [played.end for played in self._own if played.path == action and played.end is not None]
         if ends:
             return self._path(action, self._driven_at(min(ends)), 0.0)
-        longest = max(self._entity.segments, key=lambda each_one: each_one.span.end - each_one.span.start)
+        longest = max(self._entity.segments, key=lambda played: played.span.end - played.span.start)
         return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
 
     def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
         """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
         known: float | None = 0.0 if first is None else first.end
-        actions = [self._driven_at(each_one.start) for each_one in self._own if each_one.path in self._lateral]
-        for each_one in self._way.breaks:
-            if any(at < each_one.behind for at in actions):
+        actions = [self._driven_at(way_break.start) for way_break in self._own if way_break.path in self._lateral]
+        for way_break in self._way.breaks:
+            if any(at < way_break.behind for at in actions):
                 known = None
-            path = self._path(None, each_one.behind, known) if each_one.lanes else None
+            path = self._path(None, way_break.behind, known) if way_break.lanes else None
             if path is not None:
                 known = None if known is None else path.end
-                yield structs.replace(path, places=each_one.lanes)
+                yield structs.replace(path, places=way_break.lanes)
 
     def _path(
         self, after: Path | None, begin: float, start: float | None, *, is_nominal: bool = True

@@ -120,10 +120,10 @@ def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) ->
     if not is_slow(speed).any():
         knots = np.arange(rows.start, rows.stop, every)
         return knots, driven[knots]
-    own_part, ticks, nearest = ticks_of(time, speed, every * float(time[1] - time[0]))
-    moved = np.flatnonzero(np.diff(own_part, prepend=-1.0) > 0.0)
-    distance = np.interp(ticks, own_part[moved], driven[rows][moved])
-    distance[-1] += max(ticks[-1] - own_part[-1], 0.0) * float(way_of(speed[-1:])[0])
+    own_times, ticks, nearest = ticks_of(time, speed, every * float(time[1] - time[0]))
+    moved = np.flatnonzero(np.diff(own_times, prepend=-1.0) > 0.0)
+    distance = np.interp(ticks, own_times[moved], driven[rows][moved])
+    distance[-1] += max(ticks[-1] - own_times[-1], 0.0) * float(way_of(speed[-1:])[0])
     return rows.start + nearest, distance
 
 

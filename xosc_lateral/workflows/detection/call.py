@@ -139,9 +139,9 @@ def detect(
     chosen: list[Detector | Learner] = []
     for word in requested:
         chosen += _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=bool(homes))
-    tried = [each_one for each_one in chosen if isinstance(each_one, Detector)]
+    tried = [each for each in chosen if isinstance(each, Detector)]
     needs_others = any(detector.needs_observer for detector in tried)
-    own_part = dict[str, list[Tally]]()
+    tallies_at_home = dict[str, list[Tally]]()
     if goal is not None:
         tried = []
         recorded = [band_source(path, settings) for path in bands]
@@ -150,14 +150,14 @@ def detect(
             at_home = seen_through(recorded[0], scenes, seen_with) if recorded else seen_with
             views = [(scene, views_of(scene, at_home, seed, with_observers=needs_others)) for scene in scenes]
             within = any(source.is_same(each) for each in looked_at)
-            for each_one in chosen:
-                carrier, tally = set_at_home(goal, each_one, views, source.label, within=within)
+            for candidate in chosen:
+                carrier, tally = set_at_home(goal, candidate, views, source.label, within=within)
                 tried.append(carrier)
-                own_part.setdefault(source.label, []).extend([] if tally is None else [tally])
+                tallies_at_home.setdefault(source.label, []).extend([] if tally is None else [tally])
     tallies, still = list[Tally](), set[str]()
     for source in looked_at:
-        itself = own_part.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
-        elsewhere = [each_one for each_one in tried if not (itself and each_one.home_source == source.label)]
+        itself = tallies_at_home.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
+        elsewhere = [each for each in tried if not (itself and each.home_source == source.label)]
         source_tallies = [Tally(detector, source.label) for detector in elsewhere]
         moves = False
         for scene in checked(source):

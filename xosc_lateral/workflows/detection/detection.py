@@ -12,13 +12,12 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
-from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import Sensor
 from xosc_lateral.workflows.detection.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.workflows.detection.sources import Source
 from xosc_lateral.workflows.detection.tuning import Carried, Goal, not_met
-from xosc_lateral.workflows.result import PathLike, Result, write_page
+from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -78,7 +77,7 @@ class Detection(Result):
                 f"Set on a home: the threshold that gives {self.goal.what} there; a source set on itself has, for each "
                 "vehicle, the threshold of other vehicles."
             )
-            carriers = [each_one for tally in self.tallies if isinstance(each_one := tally.detector, Carried)]
+            carriers = [detector for tally in self.tallies if isinstance(detector := tally.detector, Carried)]
             if missed := not_met(carriers):
                 lines.append(f"No threshold gives that, the nearest is set: {', '.join(missed)}.")
         silent = sorted(self.still)
@@ -156,12 +155,7 @@ class Detection(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table with every threshold: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-        output = output_file(path, "detection.csv", output_suffixes())
-        claim([output], self.files, force=force)
-        write_frame(self.to_frame(), output, self.provenance())
-        return output
+        return write_table(path, "detection.csv", self.to_frame, self.provenance, inputs=self.files, force=force)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table, curves, and the worst cases in the player."""

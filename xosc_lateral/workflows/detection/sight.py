@@ -15,14 +15,13 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
-from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.detection.observation import CARRIAGEWAY_DISTANCE
 from xosc_lateral.workflows.detection.scoring import INTERVAL_SHARES, RESAMPLES
 from xosc_lateral.workflows.detection.sources import Source, checked
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene
 from xosc_lateral.workflows.detection.visibility import Boxes, points_seen, visible_share
-from xosc_lateral.workflows.result import PathLike, Result, write_page
+from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -109,13 +108,12 @@ def _lane_centre(
     Cubic Hermite pieces through the lane centres at the vehicles, in the lane's direction there.
     """
     pieces = []
-    for each_one, other in pairwise(rows):
+    for row, other in pairwise(rows):
         ends = [
-            np.array([x[k] + offset[k] * np.sin(along[k]), y[k] - offset[k] * np.cos(along[k])])
-            for k in (each_one, other)
+            np.array([x[k] + offset[k] * np.sin(along[k]), y[k] - offset[k] * np.cos(along[k])]) for k in (row, other)
         ]
         chord = float(np.hypot(*(ends[1] - ends[0])))
-        ways = [chord * np.array([np.cos(along[k]), np.sin(along[k])]) for k in (each_one, other)]
+        ways = [chord * np.array([np.cos(along[k]), np.sin(along[k])]) for k in (row, other)]
         u = np.arange(0.0, chord, LANE_STEP)[:, None] / max(chord, LANE_STEP)
         pieces.append(
             (2 * u**3 - 3 * u**2 + 1) * ends[0] + (u**3 - 2 * u**2 + u) * ways[0]
@@ -160,17 +158,17 @@ class Sight(Result):
 
     def bands(self) -> list[dict[str, Any]]:
         """Share of moments at which the second car is seen by its distance, for each source."""
-        matches = []
+        bands = []
         for source, moments in self.moments.items():
             number = np.array([one.distance // BAND for one in moments])
             seen = np.array([one.share > 0.0 for one in moments])
             for band in np.unique(number).tolist():
                 inside = number == band
-                matches.append({
+                bands.append({
                     "source": source, "from": BAND * band, "to": BAND * (band + 1.0), "moments": int(inside.sum()),
                     "second_seen": round(float(seen[inside].mean()), 6),
                 })  # fmt: skip
-        return matches
+        return bands
 
     def to_frame(self) -> pd.DataFrame:
         """One row per source and sensor."""
@@ -201,21 +199,16 @@ class Sight(Result):
         panel.y.limits = (0.0, 100.0)
         bands = self.bands()
         for number, source in enumerate(self.moments):
-            own_part = [band for band in bands if band["source"] == source]
-            middle = np.array([band["from"] + 0.5 * BAND for band in own_part])
+            shown = [band for band in bands if band["source"] == source]
+            middle = np.array([band["from"] + 0.5 * BAND for band in shown])
             panel.line(
-                middle, np.array([100.0 * band["second_seen"] for band in own_part]), color_of(number), label=source
+                middle, np.array([100.0 * band["second_seen"] for band in shown]), color_of(number), label=source
             )
         return figure
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-        output = output_file(path, "detection.csv", output_suffixes())
-        claim([output], self.files, force=force)
-        write_frame(self.to_frame(), output, self.provenance())
-        return output
+        return write_table(path, "detection.csv", self.to_frame, self.provenance, inputs=self.files, force=force)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table and figure."""
@@ -233,13 +226,13 @@ class Sight(Result):
 
 def sight_of(sources: Sequence[Source], seed: int, files: Sequence[Path]) -> Sight:
     """Look at every source; raises `NotEnoughDataError` where none has a vehicle behind two others."""
-    matches = {
+    moments = {
         source.label: [moment for scene in checked(source) for moment in moments_of(scene)] for source in sources
     }
-    if not any(matches.values()):
-        names = ", ".join(matches)
+    if not any(moments.values()):
+        names = ", ".join(moments)
         raise NotEnoughDataError(f"{names}: no vehicle has two others ahead in its lane, in places that are known")
-    return Sight(matches, sources, seed, files)
+    return Sight(moments, sources, seed, files)
 
 
 def _summary(moments: Sequence[Moment]) -> dict[str, Any]:

@@ -84,8 +84,8 @@ class Carried(Detector):
         self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
         self.home_source = home.source
         self.threshold = detector.threshold_of(limit)
-        own_part = np.array([]) if home.is_source else detector.limits
-        self._limits = np.unique(np.append(own_part, limit))
+        known_limits = np.array([]) if home.is_source else detector.limits
+        self._limits = np.unique(np.append(known_limits, limit))
         self._chosen = int(np.searchsorted(self._limits, limit))
 
     @property
@@ -145,12 +145,12 @@ class Scored:
 
 def scored(detector: Detector, views: Views) -> list[Scored]:
     """Every view that the detector can score."""
-    matches = []
+    scored_views = []
     for scene, several in views:
         usable = detector.usable(several)
         scores = detector.scores(scene, usable)
-        matches += [Scored(scene, *each) for each in zip(usable, scores, strict=True)]
-    return matches
+        scored_views += [Scored(scene, *each) for each in zip(usable, scores, strict=True)]
+    return scored_views
 
 
 def set_at_home(
@@ -161,8 +161,8 @@ def set_at_home(
         trained, at_home = detector, scored(detector, views)
     else:
         trained, at_home = out_of_fold(detector, views, source)
-    own_part = carried_within(goal, trained, at_home, source) if within else None
-    return carried(goal, trained, at_home, source), own_part
+    within_source = carried_within(goal, trained, at_home, source) if within else None
+    return carried(goal, trained, at_home, source), within_source
 
 
 def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
@@ -171,7 +171,7 @@ def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
     order = ["", *homes]
     return sorted(
         tallies,
-        key=lambda each_one: (titles.index(each_one.detector.title()), order.index(each_one.detector.home_source)),
+        key=lambda each: (titles.index(each.detector.title()), order.index(each.detector.home_source)),
     )
 
 
@@ -181,12 +181,12 @@ def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, 
     Raises `NotEnoughDataError` where fewer than two vehicles change lanes.
     """
     folds = folds_of([view for _, several in views for view in several], source, every_changes=True)
-    matches: list[Scored] = []
+    scored_views: list[Scored] = []
     for fold in sorted(set(folds.values())):
         trained = learner(_outside(views, folds, fold), source)
         held = [(scene, [view for view in several if folds[view.track.cluster] == fold]) for scene, several in views]
-        matches += scored(trained, [(scene, several) for scene, several in held if several])
-    return learner((view for _, several in views for view in several), source), matches
+        scored_views += scored(trained, [(scene, several) for scene, several in held if several])
+    return learner((view for _, several in views for view in several), source), scored_views
 
 
 def _outside(views: Views, folds: Mapping[str, int], fold: int) -> Iterable[View]:
@@ -225,9 +225,9 @@ def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], so
     parts = []
     for fold in sorted(set(folds.values())):
         others = [each for each in at_home if folds[each.view.track.cluster] != fold]
-        each_one = carried(goal, detector, others, source)
+        carrier = carried(goal, detector, others, source)
         tally = Tally(
-            Carried(detector, float(each_one.limits[each_one.chosen]), replace(each_one.home, is_source=True)), source
+            Carried(detector, float(carrier.limits[carrier.chosen]), replace(carrier.home, is_source=True)), source
         )
         for each in at_home:
             if folds[each.view.track.cluster] == fold:

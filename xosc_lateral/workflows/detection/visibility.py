@@ -41,9 +41,9 @@ def ray_distances(origin: FloatArray, bearings: FloatArray, boxes: Boxes) -> Flo
     way = np.stack([np.cos(turned), np.sin(turned)])
     half = 0.5 * np.stack([boxes.length, boxes.width])[:, :, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        each_one, other = (-half - start) / way, (half - start) / way
-        enters = np.nanmax(np.minimum(each_one, other), axis=0)
-        leaves = np.nanmin(np.maximum(each_one, other), axis=0)
+        lower, upper = (-half - start) / way, (half - start) / way
+        enters = np.nanmax(np.minimum(lower, upper), axis=0)
+        leaves = np.nanmin(np.maximum(lower, upper), axis=0)
     return np.where((enters <= leaves) & (enters > 0.0), enters, np.inf)
 
 

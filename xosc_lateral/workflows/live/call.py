@@ -13,7 +13,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.workflows.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
-from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
+from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile, write_table
 
 if TYPE_CHECKING:
     from xosc_lateral.workflows.live.scene import Scene
@@ -188,12 +188,7 @@ class LiveRun(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-        output = output_file(path, "states.csv", output_suffixes())
-        claim([output], force=force)
-        write_frame(self.to_frame(), output, self._settings)
-        return output
+        return write_table(path, "states.csv", self.to_frame, lambda: self._settings, force=force)
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step.

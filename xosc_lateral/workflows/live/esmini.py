@@ -293,8 +293,8 @@ class EsminiTraffic:
         ]
         for name, place in zip(names, places, strict=True):
             if not self._ledger.vehicles[name].steered and (why[name] or not place.is_free):
-                own_part = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
-                self.undriven[name] = why[name] or own_part
+                moved = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
+                self.undriven[name] = why[name] or moved
             if name not in busy:
                 self._ledger.vehicles[name].rest = None
         self._touched.clear()

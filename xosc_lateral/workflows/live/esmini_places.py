@@ -112,12 +112,14 @@ class Ledger:
         ahead = network.pose_at(road, state.lane, state.s).heading + network.header_offset.heading
         return left if np.cos(state.h - ahead) >= 0.0 else -left
 
-    def apart(self, reported: ToldPlace, state: ObjectState) -> float:
+    def apart(self, told_place: ToldPlace, state: ObjectState) -> float:
         """How far a vehicle is from where the player was told to have it, in the road's course or its lane's. [m]"""
-        if reported.road != self.road_of(state):
-            return 0.0 if state.lane == reported.lane and abs(state.offset_t - reported.offset_t) <= MOVED else np.inf
-        apart = abs(state.t - reported.t)
-        return float(min(apart, abs(state.offset_t - reported.offset_t)) if state.lane == reported.lane else apart)
+        if told_place.road != self.road_of(state):
+            return (
+                0.0 if state.lane == told_place.lane and abs(state.offset_t - told_place.offset_t) <= MOVED else np.inf
+            )
+        apart = abs(state.t - told_place.t)
+        return float(min(apart, abs(state.offset_t - told_place.offset_t)) if state.lane == told_place.lane else apart)
 
     def room_to_middle(self, state: ObjectState) -> float:
         """How far a vehicle is from lane 0, on the side of the lane that it is on; below 0: it is across. [m]"""
@@ -138,8 +140,10 @@ class Ledger:
             known.lane = self._lane(state, road, home)
         lane, centre = known.lane, state.t - state.offset_t
         if lane.is_lane and home != state.lane:
-            own_part, its = (self.network.lane_state_at(road, one, state.s).centre_t for one in (home, state.lane))
-            centre += own_part - its
+            home_centre, lane_centre = (
+                self.network.lane_state_at(road, one, state.s).centre_t for one in (home, state.lane)
+            )
+            centre += home_centre - lane_centre
         offset = (state.t - centre) * lane.left
         if not is_ours:
             known.base = 0.0
@@ -187,10 +191,10 @@ class Ledger:
 
     def _is_foreign(self, name: str, known: Vehicle, state: ObjectState, road: int, now: float) -> bool:
         """Whether something unknown moves it sideways."""
-        reported, foreign = known.told_place, known.foreign
+        told_place, foreign = known.told_place, known.foreign
         known.told_place = known.foreign = None
-        if reported is not None and reported.road == road:
-            if self.apart(reported, state) > MOVED:
+        if told_place is not None and told_place.road == road:
+            if self.apart(told_place, state) > MOVED:
                 foreign = (now + RESTING, state.offset_t)
                 line = f"vehicle {name!r}: moved sideways from {now:.2f} s on, by no lateral action of the scenario"
                 self._say((name, "moved"), f"{line}; it is left alone until that rests")

@@ -60,8 +60,8 @@ def later_actions(scenario: Path, spans: Spans, end: float) -> list[str]:
         return [f"whether lateral actions end later than without drivers is not known: {' '.join(str(error).split())}"]
     durations = {"::".join(one.path): one.end - one.start for one in played if one.end is not None}
     lines = []
-    for path, own_part in spans.items():
-        for begin, over in own_part:
+    for path, runs in spans.items():
+        for begin, over in runs:
             usual = durations.get(path, over - begin)
             if abs(over - begin - usual) > SAME_DURATION:
                 what = f"lateral action {path.rpartition('::')[2]!r} at {begin:.2f} s took {over - begin:.2f} s"

@@ -56,11 +56,11 @@ class Scene:
         (panel,) = figure.panels
         panel.x.limits, across = (-REACH, REACH), float(self._scene["across"])
         panel.y.limits = (-across, across)
-        shown = [each_one for each_one in self._entities if self._is_there(each_one, time)]
+        shown = [entity for entity in self._entities if self._is_there(entity, time)]
         if not shown:
             panel.line((-REACH, REACH), (0.0, 0.0), VERGE, label=f"nobody is there at {time:g} s")
             return figure
-        ranked = sorted(shown, key=lambda each_one: (each_one["name"] != name, "enriched" not in each_one))
+        ranked = sorted(shown, key=lambda entity: (entity["name"] != name, "enriched" not in entity))
         followed = ranked[0]
         x, y, _ = self._pose(followed, "nominal", time)
         camera = x, y, float(self._at(followed, followed["course"], time))

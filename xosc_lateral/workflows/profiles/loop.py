@@ -73,13 +73,9 @@ def close_loop(
 
     from xosc_lateral.drivers.loop import close
     from xosc_lateral.drivers.model.profile import Provenance
-    from xosc_lateral.files.mapping import as_mapping
 
     base = None if profile is None else given_profile(profile, library)
     inputs = given_drives(drives, columns)
-    # a mapping file serves many tables: what it says of columns that these lack is no mistake
-    there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
-    of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
     fitted_on = set() if base is None else set(base.provenance.inputs.values())
     with naming(inputs):
         result = close.close_loop(
@@ -90,7 +86,7 @@ def close_loop(
             name=name,
             provenance=Provenance(source=", ".join(inputs.inputs), inputs=dict(inputs.inputs)),
             excluded=list(leave_out),
-            roles={**of_file, **(roles or {})},
+            roles=_roles_of(inputs, columns, roles),
             progress=progress or (lambda share, what: None),
         )
     if base is not None:
@@ -123,14 +119,21 @@ def plan_loop(
         A role that there is not, or of a column that the drives lack.
     """
     from xosc_lateral.drivers.loop import close
-    from xosc_lateral.files.mapping import as_mapping
 
     inputs = given_drives(drives, columns)
+    known_roles = _roles_of(inputs, columns, roles)
+    with naming(inputs):
+        shown = close.plan_loop(inputs.drives, seed=seed, excluded=list(leave_out), roles=known_roles)
+    return LoopPlan(shown)
+
+
+def _roles_of(inputs: GivenDrives, columns: MappingLike | None, roles: Mapping[str, str] | None) -> dict[str, str]:
+    """Roles by column: those told, else a mapping file's, which serves many tables: of columns there are."""
+    from xosc_lateral.files.mapping import as_mapping
+
     there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
     of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
-    with naming(inputs):
-        shown = close.plan_loop(inputs.drives, seed=seed, excluded=list(leave_out), roles={**of_file, **(roles or {})})
-    return LoopPlan(shown)
+    return {**of_file, **(roles or {})}
 
 
 class LoopPlan(Result):
@@ -216,8 +219,8 @@ class ClosedLoop(Result):
         """One line."""
         names = ", ".join(self.findings) or "no effect added"
         error = f"error {self.error_before:.4f} -> {self.error_after:.4f} m"
-        if (own_part := self._result.own_errors) is not None:
-            error = f"where they act, error {own_part[0]:.4f} -> {own_part[1]:.4f} m; over everything {error}"
+        if (own_errors := self._result.own_errors) is not None:
+            error = f"where they act, error {own_errors[0]:.4f} -> {own_errors[1]:.4f} m; over everything {error}"
         return f"{names}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:

@@ -32,7 +32,7 @@ FINDING_FIELDS = (
 
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
-    own_part = result.own_errors
+    own_errors = result.own_errors
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     left, scores, known = result.lack_of_fit, result.scores, result.explained
     return {
@@ -55,7 +55,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         ],
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "shown": shown_records(result.shown),
-        "own_error": own_part and {"before": own_part[0], "after": own_part[1]},
+        "own_error": own_errors and {"before": own_errors[0], "after": own_errors[1]},
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
         "explained": known

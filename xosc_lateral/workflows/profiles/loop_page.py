@@ -35,10 +35,9 @@ def loop_text(result: LoopResult) -> str:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
     before, after, halves = (1000.0 * value for value in (result.error_before, result.error_after, result.floor))
-    if (own_part := result.own_errors) is not None:
-        lines.append(
-            f"where the effects act: held-out error {1e3 * own_part[0]:.1f} mm before, {1e3 * own_part[1]:.1f} mm after"
-        )
+    if (own_errors := result.own_errors) is not None:
+        own_before, own_after = (1e3 * value for value in own_errors)
+        lines.append(f"where the effects act: held-out error {own_before:.1f} mm before, {own_after:.1f} mm after")
     over = "over everything: " if result.own_errors else ""
     ends = f"{before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
     lines.append(f"{over}held-out error {ends}")
@@ -64,13 +63,15 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(loop_words.outcome(result))
     tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
-    own_part = result.own_errors
+    own_errors = result.own_errors
     figures = (
         []
-        if own_part is None
+        if own_errors is None
         else [
-            KeyFigure(f"{1e3 * own_part[0]:.1f} mm", "before, where the effects act", "in the cells of what was found"),
-            KeyFigure(f"{1e3 * own_part[1]:.1f} mm", "after, where the effects act", "in the same cells"),
+            KeyFigure(
+                f"{1e3 * own_errors[0]:.1f} mm", "before, where the effects act", "in the cells of what was found"
+            ),
+            KeyFigure(f"{1e3 * own_errors[1]:.1f} mm", "after, where the effects act", "in the same cells"),
         ]
     )
     page.key_figures(

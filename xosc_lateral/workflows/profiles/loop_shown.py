@@ -18,19 +18,19 @@ SHOWN_NOTE = (
 def shown_rows(shown: Sequence[Shown]) -> list[dict[str, str | None]]:
     """What drives can show, as a table in words."""
 
-    def size(each_one: Shown, value: float | None) -> str | None:
-        return None if value is None else f"{value:.2f}{GAP}m" if each_one.acts == "mean" else f"factor{GAP}{value:.2f}"
+    def size(entry: Shown, value: float | None) -> str | None:
+        return None if value is None else f"{value:.2f}{GAP}m" if entry.acts == "mean" else f"factor{GAP}{value:.2f}"
 
     return [
         {
-            "look": each_one.what,
-            "on": each_one.acts,
-            "tested": "yes" if each_one.tested else "no",
-            "outcome": each_one.why,
+            "look": entry.what,
+            "on": entry.acts,
+            "tested": "yes" if entry.tested else "no",
+            "outcome": entry.why,
         }
-        | {"smallest": size(each_one, each_one.smallest), "at most": size(each_one, each_one.bound)}
-        | {"more minutes": None if each_one.more_minutes is None else f"{each_one.more_minutes:.0f}"}
-        for each_one in shown
+        | {"smallest": size(entry, entry.smallest), "at most": size(entry, entry.bound)}
+        | {"more minutes": None if entry.more_minutes is None else f"{entry.more_minutes:.0f}"}
+        for entry in shown
     ]
 
 
@@ -55,7 +55,6 @@ def shown_words(shown: Sequence[Shown]) -> str:
         sizes = [one.smallest for one in shown if one.acts == acts and one.smallest is not None]
         words += [form.format(min(sizes), max(sizes))] if sizes else []
     untested = sum(not one.tested for one in shown)
-    matches = f"effects from {' and '.join(words)} on, depending on the column, in four of five cases"
-    return (
-        f"These drives show {matches if words else 'no effect'}; {untested} of {len(shown)} looks could not be taken."
-    )
+    effects = f"effects from {' and '.join(words)} on, depending on the column, in four of five cases"
+    seen = effects if words else "no effect"
+    return f"These drives show {seen}; {untested} of {len(shown)} looks could not be taken."

@@ -14,7 +14,6 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
-from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.files.tables import read_context, read_table
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
@@ -29,6 +28,7 @@ from xosc_lateral.workflows.result import (
     given_drives,
     given_profile,
     naming,
+    write_table,
 )
 
 if TYPE_CHECKING:
@@ -210,12 +210,9 @@ class Offsets(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-        output = output_file(path, f"{self.profile.name}.csv", output_suffixes())
-        claim([output], () if self._tables is None else self._tables.files, force=force)
-        write_frame(self.to_frame(), output, self._provenance())
-        return output
+        files = () if self._tables is None else self._tables.files
+        name = f"{self.profile.name}.csv"
+        return write_table(path, name, self.to_frame, self._provenance, inputs=files, force=force)
 
     def _provenance(self) -> dict[str, Any]:
         from xosc_lateral.files.profiles import profile_hash

@@ -288,8 +288,8 @@ class _Collected:
         """All of it, in order."""
         rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, ROW_SIZE)
         notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in self.left_out.items())]
-        matches, codes = np.unique(rows[:, 0].astype(np.int64), return_inverse=True)
-        labels = [self.names[number] for number in matches.tolist()]
+        vehicle_numbers, codes = np.unique(rows[:, 0].astype(np.int64), return_inverse=True)
+        labels = [self.names[number] for number in vehicle_numbers.tolist()]
         try:
             known = identify(labels, codes, *rows[:, 1:4].T)
         except ValueError as error:

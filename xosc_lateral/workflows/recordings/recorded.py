@@ -127,13 +127,13 @@ def _place(
     lost = len(rows) - kept
     reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
     counts.update({"kept": kept, **{why: max(count, 0) for why, count in reasons.items()}})
-    stated = ", ".join(f"{count} {why}" for why, count in reasons.items() if count > 0)
+    rows_lost = ", ".join(f"{count} {why}" for why, count in reasons.items() if count > 0)
     if not passages:
         head = f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap"
-        left_out.append(f"{head}; of {len(rows)} rows {stated}")
+        left_out.append(f"{head}; of {len(rows)} rows {rows_lost}")
         return None
     if lost:
-        left_out.append(f"{track.name}: {lost} of {len(rows)} rows: {stated}")
+        left_out.append(f"{track.name}: {lost} of {len(rows)} rows: {rows_lost}")
     if inferred[best].any():
         left_out.append(f"{track.name}: {int(inferred[best].sum())} rows are inferred: nobody saw it for up to 4 s")
     moments, x, y, turned = time[best] - start, x[best], y[best], np.where(way[best] < 0, np.pi, 0.0)

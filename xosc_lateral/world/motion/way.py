@@ -93,10 +93,10 @@ def way_of(motion: EntityMotion, network: RoadNetwork, length: float, *, has_rou
     rows = rows[motion.road[rows] >= 0]
     ways = network.travel_directions(motion.road[rows], motion.lane[rows]) * motion.way(rows)
     driven, anew = distance_driven(motion)[rows], np.isin(rows, motion.breaks)
-    matches = list(zip(driven, motion.road[rows], motion.lane[rows], motion.s[rows], ways, strict=True))
+    driven_rows = list(zip(driven, motion.road[rows], motion.lane[rows], motion.s[rows], ways, strict=True))
     offset = motion.offset[rows]
-    beyond, ends = _onward(network, matches[-1], length, has_route) if matches else ([], False)
-    distance, road, lane, s, side = np.array([*matches, *beyond], dtype=np.float64).reshape(-1, 5).T
+    beyond, ends = _onward(network, driven_rows[-1], length, has_route) if driven_rows else ([], False)
+    distance, road, lane, s, side = np.array([*driven_rows, *beyond], dtype=np.float64).reshape(-1, 5).T
     offset = np.append(offset, np.full(len(beyond), offset[-1] if len(offset) else 0.0))
     way = Way(distance, road.astype(np.int64), lane.astype(np.int64), s, side, offset, ())
     return way._replace(breaks=tuple(_breaks(way, network, np.append(anew, np.zeros(len(beyond), bool)), ends)))
@@ -109,21 +109,21 @@ Row = tuple[float, int, int, float, int]
 def _onward(network: RoadNetwork, last: Row, length: float, has_route: bool) -> tuple[list[Row], bool]:
     """Places beyond the last one, straight on; whether the lane ends there, or what comes is not known."""
     distance, road, lane, s, way = float(last[0]), int(last[1]), int(last[2]), float(last[3]), int(last[4])
-    matches: list[Row] = []
+    rows: list[Row] = []
     while distance < length and lane:
         moved = network.advance(road, lane, s, SPACING, direction=way)
         unknown = has_route and moved.road != road and len(network.next_lanes(road, lane, way)) > 1
         if not unknown:
             road, lane, s, way = moved[:4]
             distance += SPACING - moved.remaining
-            matches.append((distance, road, lane, s, way))
+            rows.append((distance, road, lane, s, way))
         if unknown or moved.remaining > 0.0:
-            return matches, True
-    return matches, False
+            return rows, True
+    return rows, False
 
 
 def _breaks(way: Way, network: RoadNetwork, anew: BoolArray, ends: bool) -> list[Break]:
-    matches: list[Break] = []
+    breaks: list[Break] = []
     again = 0
     t = network.offset_to_t(way.road, way.lane, way.s, way.offset)
     enters, leaps = np.diff(way.road) != 0, np.abs(np.diff(t)) > LEAP
@@ -132,11 +132,11 @@ def _breaks(way: Way, network: RoadNetwork, anew: BoolArray, ends: bool) -> list
             continue
         why = _why(way, network, k) if enters[k] else LANE_ENDS
         if why:
-            matches.append(_break(way, network, k, why))
-            again = int(np.searchsorted(way.distance, matches[-1].behind))
+            breaks.append(_break(way, network, k, why))
+            again = int(np.searchsorted(way.distance, breaks[-1].behind))
     if ends and len(way.distance):
-        matches.append(_break(way, network, len(way.road) - 1, LANE_ENDS))
-    return matches
+        breaks.append(_break(way, network, len(way.road) - 1, LANE_ENDS))
+    return breaks
 
 
 def _why(way: Way, network: RoadNetwork, k: int) -> str:

@@ -289,12 +289,12 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
 def driven_from_the_start(scenario: Scenario) -> dict[str, Domains]:
     """Domains of each entity that controllers have when the storyboard begins."""
     for_carla = scenario.header.is_left_handed
-    matches = {one.name: DrivingControllers(one.controllers, for_carla=for_carla) for one in scenario.entities}
+    driving = {one.name: DrivingControllers(one.controllers, for_carla=for_carla) for one in scenario.entities}
     for private in scenario.storyboard.init.privates:
         for action in private.actions:
-            if isinstance(action.content, private_actions.CONTROLLER) and private.entity_ref in matches:
-                matches[private.entity_ref].follow(action.content)
-    return {name: controllers.domains for name, controllers in matches.items() if controllers.domains}
+            if isinstance(action.content, private_actions.CONTROLLER) and private.entity_ref in driving:
+                driving[private.entity_ref].follow(action.content)
+    return {name: controllers.domains for name, controllers in driving.items() if controllers.domains}
 
 
 def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:

@@ -90,11 +90,11 @@ class Places:
     unit: IntArray | None = None
     """The same for a vehicle and what it pulls: they don't see each other."""
 
-    def apart(self, each_one: IntArray, other: IntArray) -> BoolArray:
+    def apart(self, vehicle: IntArray, other: IntArray) -> BoolArray:
         """Pairs that are no vehicle and its own trailer."""
         if self.unit is None:
-            return np.ones(len(each_one), dtype=np.bool_)
-        return np.asarray(self.unit[each_one] != self.unit[other])
+            return np.ones(len(vehicle), dtype=np.bool_)
+        return np.asarray(self.unit[vehicle] != self.unit[other])
 
 
 def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:

@@ -189,7 +189,7 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
     def slope(parameters: FloatArray) -> FloatArray:
         return np.array([cost(parameters + step) - cost(parameters - step) for step in steps]) / (2.0 * NUDGE)
 
-    matches = minimize(
+    optimum = minimize(
         cost,
         start,
         method="L-BFGS-B",
@@ -197,11 +197,11 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
         bounds=[(-FARTHEST, FARTHEST)] * len(start),
         options={"maxiter": MAXIMUM_TURNS, "gtol": FLATNESS, "ftol": 0.0},
     )
-    bends = np.array([slope(matches.x + 10.0 * step) - slope(matches.x - 10.0 * step) for step in steps]) / (
+    bends = np.array([slope(optimum.x + 10.0 * step) - slope(optimum.x - 10.0 * step) for step in steps]) / (
         20.0 * NUDGE
     )
     inverse = np.linalg.pinv(bends + bends.T, rcond=FLATNESS, hermitian=True)
-    best = np.asarray(matches.x)
+    best = np.asarray(optimum.x)
     for _ in range(LAST_STEPS):
         best = best - 2.0 * inverse @ slope(best)
     return best, bool(np.abs(slope(best)).max() < 10.0 * FLATNESS)
@@ -209,11 +209,11 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
 
 def partial_autocorrelations(coefficients: FloatArray) -> FloatArray:
     """Of a stable autoregression, shape (order,). [-]"""
-    matches = np.empty(len(coefficients))
+    reflections = np.empty(len(coefficients))
     for k in reversed(range(len(coefficients))):
-        matches[k] = last = coefficients[-1]
+        reflections[k] = last = coefficients[-1]
         coefficients = (coefficients[:-1] + last * coefficients[:-1][::-1]) / (1.0 - last**2)
-    return matches
+    return reflections
 
 
 def first_precision(coefficients: FloatArray) -> FloatArray:

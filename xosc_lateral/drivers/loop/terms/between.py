@@ -39,15 +39,26 @@ LEAST_APART = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class BetweenTerm(ColumnTerm):
+class _DrivesTerm(ColumnTerm):
+    """What differs from drive to drive."""
+
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
+    seen_held_out: ClassVar[bool] = False
+    within_drives: ClassVar[bool] = False
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change or factor between drives; it has no lag."""
+        size = super().describe(fitted, effects, key)
+        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenTerm(_DrivesTerm):
     """Between-driver regression of the drives' levels."""
 
     component: ClassVar[str] = "between"
     kind: ClassVar[str] = "location"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
-    seen_held_out: ClassVar[bool] = False
-    within_drives: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
@@ -96,22 +107,14 @@ class BetweenTerm(ColumnTerm):
         is_self = [term is self for term in of_kind(fitted, BetweenTerm)]
         return (self.sized(fitted.coarse, Acts.LOCATION, sizes[is_self], errors[is_self]),)
 
-    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
-        """Change between drives; it has no lag."""
-        size = super().describe(fitted, effects, key)
-        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
-
 
 @dataclass(frozen=True, eq=False)
-class BetweenSpreadTerm(ColumnTerm):
+class BetweenSpreadTerm(_DrivesTerm):
     """Between-driver regression of the logarithm of the drives' own sizes of movement."""
 
     component: ClassVar[str] = "between_spread"
     kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 3.0
-    seen_held_out: ClassVar[bool] = False
-    within_drives: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread that a drive has"
 
@@ -127,25 +130,20 @@ class BetweenSpreadTerm(ColumnTerm):
         sizes, errors = np.array([pooled.size]), np.array([pooled.error])
         return tuple(self.sized(fitted.coarse, acts, sizes, errors) for acts in (Acts.SPREAD, Acts.FINE))
 
-    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
-        """Factor between drives; it has no lag."""
-        size = super().describe(fitted, effects, key)
-        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
-
 
 def whole_drive_columns(search: Search) -> dict[str, FloatArray]:
     """Columns that may act and are constant in every drive, shape (drives,), in their units; NaN: a drive too short."""
-    coarse, matches = search.coarse, {}
+    coarse, constant = search.coarse, {}
     inside, lasting = coarse.timeline.valid, counted(coarse) > 0.0
     for name, column in search.columns.items():
-        own_part = [coarse.context[name][span][inside[span]] for span in coarse.timeline.spans]
-        known = [values for values, lasts in zip(own_part, lasting, strict=True) if lasts]
+        by_drive = [coarse.context[name][span][inside[span]] for span in coarse.timeline.spans]
+        known = [values for values, lasts in zip(by_drive, lasting, strict=True) if lasts]
         if column.period or not all(np.isfinite(values).all() and np.ptp(values) == 0.0 for values in known):
             continue
-        matches[name] = np.array(
-            [values[0] if lasts else np.nan for values, lasts in zip(own_part, lasting, strict=True)]
+        constant[name] = np.array(
+            [values[0] if lasts else np.nan for values, lasts in zip(by_drive, lasting, strict=True)]
         )
-    return matches
+    return constant
 
 
 def can_be_told(values: FloatArray) -> bool:
@@ -159,13 +157,13 @@ def between_drives(fitted: Fitted, kind: type[ColumnTerm], values: FloatArray) -
     coarse, seconds = fitted.coarse, counted(fitted.coarse)
     rows = (seconds > 0.0) & np.isfinite(values)
     if kind is BetweenTerm:
-        own_part, noise = fitted.levels, 1.0 / np.maximum(fitted.whitener.power, 1e-300)
+        places, noise = fitted.levels, 1.0 / np.maximum(fitted.whitener.power, 1e-300)
     else:
         _, scales, known = design_of(coarse, fitted.terms)
-        own_part = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
+        places = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
         squares = clipped_squares(fitted.innovations, coarse.valid)[coarse.valid]
         noise = 0.25 * float(squares.var() / squares.mean() ** 2) / np.maximum(seconds, 1.0)
-    return regress(own_part[rows], noise[rows], values[rows])
+    return regress(places[rows], noise[rows], values[rows])
 
 
 def _best_of_whole_drives(kind: type[ColumnTerm], search: Search, fitted: Fitted) -> Outcome | None:

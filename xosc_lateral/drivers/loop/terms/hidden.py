@@ -284,11 +284,11 @@ def line(rows: FloatArray, valid: BoolArray, drive: IndexArray, rng: np.random.G
             middle = beyond + 1 + np.flatnonzero(band)
             return np.asarray(sums[:, middle + half] - sums[:, middle - half - 1])
 
-        own_part = [min(width // 2 + LINE_MARGIN, beyond - 1) for width in WIDTHS]
+        gaps = [min(width // 2 + LINE_MARGIN, beyond - 1) for width in WIDTHS]
         return [
             window_sum(width // 2)
             / np.maximum((window_sum(beyond) - window_sum(gap)) / (2 * (beyond - gap)) * width, 1e-300)
-            for width, gap in zip(WIDTHS, own_part, strict=True)
+            for width, gap in zip(WIDTHS, gaps, strict=True)
         ]
 
     seen = ratios(rows[None])

@@ -107,12 +107,12 @@ class Tracks:
         for number, label in enumerate(self.recordings):
             mine = np.flatnonzero(self.recording == number)
             if len(mine) and wanted in (None, label):
-                vehicles_there, vehicle = np.unique(self.vehicle[mine], return_inverse=True)
+                numbers, vehicle = np.unique(self.vehicle[mine], return_inverse=True)
                 arrays: dict[str, Any] = {
                     name: values[mine] for name, values in vars(self).items()
                     if isinstance(values, np.ndarray) and name not in ("vehicle", "recording")
                 }  # fmt: skip
-                names = tuple(self.names[k] for k in vehicles_there.tolist())
+                names = tuple(self.names[k] for k in numbers.tolist())
                 made.append(replace(self, names=names, vehicle=vehicle, recording=None, recordings=(label,), **arrays))
         return made
 

@@ -70,8 +70,8 @@ def poses_of(places: Sequence[positions.Position], simulation: Simulation) -> li
         if beside and place.entity_ref != beside[0].entity_ref:
             break
         beside.append(place)
-    matches = _poses_beside(beside, simulation) if beside else []
-    return matches + [pose_of(place, simulation) for place in places[len(beside) :]]
+    poses = _poses_beside(beside, simulation) if beside else []
+    return poses + [pose_of(place, simulation) for place in places[len(beside) :]]
 
 
 def _poses_beside(places: Sequence[positions.RelativeRoadPosition], simulation: Simulation) -> list[Pose]:
