@@ -122,12 +122,12 @@ class Meaning:
         until = last if self._is_cut_off else motion.end_time
         self.limit = min(inf if time_limit is None else time_limit, LONGEST_RUN * max(until, LEAST_DURATION))
         self._before = list(self._runs(played.scenario))
+        self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
 
     @property
     def end(self) -> float:
         """Of the longest run, that under a braking ego aside. [s]"""
-        nominal_slower_faster = self._before[:3]
-        return max(motion.end_time for _, motion in nominal_slower_faster)
+        return max(motion.end_time for _, motion in self._before[:3])
 
     @property
     def longest_time(self) -> float:
@@ -162,13 +162,15 @@ class Meaning:
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         comparisons, after = [], [run for _, run in self._runs(scenario)]
         for (driven, before), run, name in zip(self._before, after, (NOMINAL_RUN, *OTHER_RUNS), strict=False):
-            kept = [one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories]
-            ends = run is after[0] or not gone  # else stories that others wait for may be gone
+            kept = (one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories)
             nominal = replace(before, actions=tuple(kept))
+            ends = run is after[0] or not gone  # else stories that others wait for may be gone
             comparison = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
             if comparison.changes:
-                chance = self._by_chance(driven, nominal, trajectories)
-                others = (one for one in comparison.changes if abs(one.size) > chance.get(one.what, 0.0))
+                key = name, frozenset(trajectories)
+                if key not in self._chance:  # of the source alone: the same for all that is tried
+                    self._chance[key] = self._by_chance(driven, nominal, trajectories)
+                others = (one for one in comparison.changes if abs(one.size) > self._chance[key].get(one.what, 0.0))
                 comparison = structs.replace(comparison, changes=tuple(others))
             movement = changed_movement(network, before, run, moved)
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
@@ -345,12 +347,6 @@ def _blamed(
     order += range(len(paths))
     free = (k for k in order if sizes.get(k, 1.0) > SIZES[-1] and (k, len(changes)) not in stuck)
     return next(free, None)
-
-
-def play_until(played: Played, end: float, *, step: float) -> Played:
-    """The same run, stopped at another time. [s]"""
-    motion = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)
-    return replace(played, motion=motion)
 
 
 def ending_at(scenario: Scenario, end: float) -> Scenario:

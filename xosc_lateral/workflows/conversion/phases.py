@@ -102,13 +102,13 @@ class _Phases:
         ends = [played.end for played in self._own if played.path == action and played.end is not None]
         if ends:
             return self._path(action, self._driven_at(min(ends)), 0.0)
-        longest = max(self._entity.segments, key=lambda played: played.span.end - played.span.start)
+        longest = max(self._entity.segments, key=lambda segment: segment.span.end - segment.span.start)
         return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
 
     def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
         """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
         known: float | None = 0.0 if first is None else first.end
-        actions = [self._driven_at(way_break.start) for way_break in self._own if way_break.path in self._lateral]
+        actions = [self._driven_at(played.start) for played in self._own if played.path in self._lateral]
         for way_break in self._way.breaks:
             if any(at < way_break.behind for at in actions):
                 known = None

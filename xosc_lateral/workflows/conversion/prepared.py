@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun
 from xosc_lateral.workflows.conversion.load import Played, load_scenario, play_loaded, road_network
-from xosc_lateral.workflows.conversion.meaning import Meaning, play_until
+from xosc_lateral.workflows.conversion.meaning import Meaning, ending_at
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
+from xosc_lateral.world.player.player import play
 
 Latest = TypeVar("Latest")
 
@@ -35,7 +37,13 @@ class Prepared:
 
     def until(self, end: float) -> Played:
         """The same run, stopped at another time. [s]"""
-        return self._latest_made("until", end, lambda: play_until(self.played, end, step=self._step))
+        played = self.played
+
+        def stopped() -> Played:
+            later = ending_at(played.scenario, end)
+            return replace(played, motion=play(later, played.network, step=self._step, time_limit=end + 1.0))
+
+        return self._latest_made("until", end, stopped)
 
     def segmented(self, run: Played, **choices: Any) -> SegmentedRun:
         """One of its runs as drivers see it, see `SegmentedRun`; kept where it is small."""
