@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import os
+import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +102,20 @@ def test_an_error_keeps_its_place(file: Path) -> None:
         misbehaved(file, "wrong")
     assert (raised.value.path, raised.value.line, raised.value.element) == (file, 3, "A")
     assert str(raised.value) == f"{file}:3: A: no good"
+
+
+def test_a_process_waits_longer_than_a_file_may_take(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "PARSER_TIME", Limit(1, "s", "time", "a test"))
+    process = process_of(file)
+    time.sleep(2.5)
+    assert process_of(file) == process
+
+
+def test_a_process_that_was_ended_meanwhile_is_replaced(file: Path) -> None:
+    process = process_of(file)
+    os.kill(process, signal.SIGKILL)
+    time.sleep(0.2)
+    assert process_of(file) != process
 
 
 def test_threads_read_beside_each_other(file: Path) -> None:

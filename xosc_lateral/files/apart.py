@@ -67,7 +67,7 @@ def _asked(read: Callable[..., Any], args: tuple[Any, ...], keywords: dict[str, 
     path = Path(args[0])
     size = source.check_regular(path).st_size
     seconds = PARSER_TIME.value + PARSER_TIME_PER_SIZE.value * size / 1e6
-    process = _idle.pop() if _idle else _started()
+    process = _ready()
     requests, answers = cast(IO[bytes], process.stdin), cast(IO[bytes], process.stdout)
     timer, goes_on = threading.Timer(seconds, process.kill), False
     timer.start()
@@ -91,6 +91,16 @@ def _asked(read: Callable[..., Any], args: tuple[Any, ...], keywords: dict[str, 
     if error is not None:
         raise error
     return made
+
+
+def _ready() -> subprocess.Popen[bytes]:
+    """One that waits and lives (somebody may have ended it meanwhile), or a new one."""
+    while _idle:
+        process = _idle.pop()
+        if process.poll() is None:
+            return process
+        _end(process)
+    return _started()
 
 
 def _started() -> subprocess.Popen[bytes]:
@@ -133,6 +143,8 @@ def serve() -> None:
             error = FormatError(PARSER_MEMORY.refusal(PARSER_MEMORY.value), path=args[0])
         except Exception as raised:
             error = raised
+        if hasattr(signal, "alarm"):
+            signal.alarm(0)  # while it waits for the next file, nothing ends it but the parent
         parsed = {path: digest for path, digest in source.parsed_files().items() if before.get(path) != digest}
         goes_on = status_bytes(1) - begin < MUCH_MEMORY
         pickle.dump((made, error, parsed, goes_on), answers, protocol=5)

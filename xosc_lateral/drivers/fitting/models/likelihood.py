@@ -37,6 +37,7 @@ PASSES = 2
 
 IMPOSSIBLE_COST = 1e6
 """Of parameters whose likelihood can't be told: beyond any other, so that the search turns back. [-]"""
+
 MAXIMUM_TURNS = 200
 """Of the search for the largest likelihood. [-]"""
 
@@ -203,7 +204,10 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
     inverse = np.linalg.pinv(bends + bends.T, rcond=FLATNESS, hermitian=True)
     best = np.asarray(optimum.x)
     for _ in range(LAST_STEPS):
-        best = best - 2.0 * inverse @ slope(best)
+        nearer = best - 2.0 * inverse @ slope(best)
+        if np.abs(nearer).max() > FARTHEST:  # the search ended at an edge: beyond it there is nothing to be exact about
+            break
+        best = nearer
     return best, bool(np.abs(slope(best)).max() < 10.0 * FLATNESS)
 
 
