@@ -89,6 +89,9 @@ def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
 COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")
 """[s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane centre along +t, [m]."""
 
+RECOGNISED_BY = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s")
+"""What every table of states has, of a played scenario or of live drivers: one with more is one, too."""
+
 _NUMBERS = "%.3f,%s,%.4f,%.4f,%.4f,%.6f,%.4f,%s,%d,%.4f,%.4f"
 
 

@@ -97,7 +97,7 @@ class ConvertSettings:
         help="Profile of one entity; may be repeated.",
     )
     only: frozenset[str] | None = option(
-        None, say.names, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        None, say.names, "--enrich", kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
         help="Enrich only this entity; may be repeated.",
     )
     ego: frozenset[str] | None = option(
@@ -128,7 +128,7 @@ class ConvertSettings:
         "a vehicle under test.",
     )
     player: Player = option(
-        Player.STANDARD, say.one_of(Player), "--for", kind=Player, cell=say.as_it_is,
+        Player.STANDARD, say.one_of(Player), "--player", kind=Player, cell=say.as_it_is,
         help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
     )
     version: str | None = option(
@@ -139,7 +139,7 @@ class ConvertSettings:
     road: Path | None = option(None, Path, cell=say.beside)
     road_path: tuple[Path, ...] = option((), say.paths)
     attempts: int = option(
-        1, say.whole_number(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        1, say.whole_number(1), "--attempts", kind=int, cell=say.as_it_is, min=1,
         help="Attempts at most, while vehicles collide or leave their lane.",
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)

@@ -35,7 +35,7 @@ from xosc_lateral.files.mapping import (
     plain_header,
     standard_sources,
 )
-from xosc_lateral.files.output_tables import COLUMNS
+from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.cuts import MOVING_SPEED, require_headings
@@ -59,9 +59,6 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 """Name -> headers that are understood, as `plain_header` has them, the first that is there; others by the map."""
 
 FRAMES = ("frame", "frame_id", "frame_num", "frame_number", "timestep", "time_step")  # counts, of a rate not in them
-
-STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
-"""What a table of states has, whether `play` or `live` wrote it; its positions are those of reference points."""
 
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
@@ -154,8 +151,8 @@ def tracks_of(
     table: pd.DataFrame, path: Path, columns: Sequence[str], saved: TableMapping, *, is_log: bool = False
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
-    is_played = set(map(str, table.columns)) >= STATE_COLUMNS
-    if is_played:  # a table of states, as `play` and `live` write it
+    is_played = set(map(str, table.columns)) >= set(RECOGNISED_BY)
+    if is_played:  # its positions are those of reference points
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     rows, lost = _columns(table, path, saved, columns)
     codes, labels = rows["vehicle"].factorize(sort=True)
