@@ -11,7 +11,8 @@ References
 .. [2] M. M. Siddiqui, "On the inversion of the sample covariance matrix in a stationary autoregressive process",
    Annals of Mathematical Statistics 29, 1958: the inverse covariance of the first values in closed form.
 .. [3] O. Barndorff-Nielsen, G. Schou, "On the parametrization of autoregressive models by partial autocorrelations",
-   J. Multivariate Analysis 3, 1973: any of them within -1 and 1 are stable.
+   J. Multivariate Analysis 3, 1973: any of them within -1 and 1 are stable. Here they are those of a model whose roots
+   are divided by `MAX_ROOT`, the longest memory that a model may have.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, stabilise
+from xosc_lateral.drivers.model.core.autoregressive.parameters import MAX_ROOT, Autoregression, stabilise
 
 WILD_SQUARE_RATIO = 9.0
 """Mean square residual over the median driver's beyond which a driver is wild: three times as far. Drivers on a
@@ -78,7 +79,7 @@ def fit_autoregression(
     if not ended:
         warnings.warn(f"slow movement is not sure: its fit had not ended after {MAXIMUM_TURNS} turns", stacklevel=2)
     scale = float(np.exp(0.5 * np.average(np.log(residual), weights=sums.count)))
-    return Autoregression(stabilise(coefficients), scale), float(ratio * sums.terms(parameters, weights)[0])
+    return Autoregression(coefficients, scale), float(ratio * sums.terms(parameters, weights)[0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -130,6 +131,7 @@ class DriverSums:
         for k in range(self.order):
             coefficients[..., :k] -= partial[..., k, None] * coefficients[..., :k][..., ::-1]
             coefficients[..., k] = partial[..., k]
+        coefficients *= MAX_ROOT ** np.arange(1.0, self.order + 1)
         return coefficients, np.exp(parameters[..., self.order :]).sum(axis=-1)
 
     def weighted(self, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -172,7 +174,7 @@ class DriverSums:
         squares = (shock @ products * shock).sum(axis=-1) + (inverse * first_products).sum(axis=(-2, -1))
         squares = squares - ratio * (pulled**2 / inflated).sum(axis=-1) - common**2 / weight
         moments = float((self.count + self.order * self.runs).sum()) - 1.0
-        first = np.log1p(-(np.tanh(parameters[..., : self.order]) ** 2)) @ np.arange(1.0, self.order + 1)
+        first = np.log1p(-(partial_autocorrelations(coefficients) ** 2)) @ np.arange(1.0, self.order + 1)
         logs = np.log(inflated).sum(axis=-1) + np.log(weight) - float(self.runs.sum()) * first
         return squares / moments, logs, moments
 
@@ -193,15 +195,19 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
     def cost(parameters: FloatArray) -> FloatArray:
         return sums.cost(parameters, weighted)
 
-    def slope(parameters: FloatArray) -> FloatArray:
+    def cost_and_slope(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         there = parameters[..., None, :]
-        return (cost(there + steps) - cost(there - steps)) / (2.0 * NUDGE)
+        costs = cost(np.concatenate([there, there + steps, there - steps], axis=-2))
+        return costs[..., 0], (costs[..., 1 : len(start) + 1] - costs[..., len(start) + 1 :]) / (2.0 * NUDGE)
+
+    def slope(parameters: FloatArray) -> FloatArray:
+        return cost_and_slope(parameters)[1]
 
     optimum = minimize(
-        cost,
+        cost_and_slope,
         start,
         method="L-BFGS-B",
-        jac=slope,
+        jac=True,
         bounds=[(-FARTHEST, FARTHEST)] * len(start),
         options={"maxiter": MAXIMUM_TURNS, "gtol": FLATNESS, "ftol": 0.0},
     )
@@ -217,11 +223,12 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
 
 
 def partial_autocorrelations(coefficients: FloatArray) -> FloatArray:
-    """Of a stable autoregression, shape (order,). [-]"""
-    reflections = np.empty(len(coefficients))
-    for k in reversed(range(len(coefficients))):
-        reflections[k] = last = coefficients[-1]
-        coefficients = (coefficients[:-1] + last * coefficients[:-1][::-1]) / (1.0 - last**2)
+    """Of stable autoregressions, shape (..., order). [-]"""
+    reflections = np.empty_like(coefficients)
+    for k in reversed(range(coefficients.shape[-1])):
+        last = coefficients[..., k, None]
+        reflections[..., k] = coefficients[..., k]
+        coefficients = (coefficients[..., :k] + last * coefficients[..., :k][..., ::-1]) / (1.0 - last**2)
     return reflections
 
 
