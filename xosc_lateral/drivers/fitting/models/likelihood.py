@@ -20,6 +20,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
@@ -207,7 +208,7 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
         return cost_and_slope(parameters)[1]
 
     optimum = minimize(
-        cost_and_slope,
+        cast(Any, cost_and_slope),  # of one point: a number and a slope
         start,
         method="L-BFGS-B",
         jac=True,
