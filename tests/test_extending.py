@@ -45,7 +45,7 @@ def _write(step: re.Match[str], tree: Path) -> Path:
     begin = text.index(anchor)
     end = text.index("\n", begin) + 1
     if step["side"] == "instead of":
-        changed = text[:begin] + step["code"].rstrip("\n") + text[begin + len(anchor) :]
+        changed = text[:begin] + step["code"].strip("\n") + text[begin + len(anchor) :]
     else:
         place = begin if step["side"] == "above" else end
         changed = text[:place] + step["code"] + text[place:]
