@@ -195,6 +195,9 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
 
     weighted, steps = sums.weighted(sizes), NUDGE * np.eye(len(start))
 
+    def cost(parameters: FloatArray) -> float:
+        return float(sums.cost(parameters, weighted))
+
     def slope(parameters: FloatArray) -> FloatArray:
         there = parameters[..., None, :]
         ahead, behind = np.split(
@@ -203,7 +206,7 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
         return np.asarray((ahead - behind) / (2.0 * NUDGE))
 
     optimum = minimize(
-        lambda parameters: float(sums.cost(parameters, weighted)),
+        cost,
         start,
         method="L-BFGS-B",
         jac=slope,
