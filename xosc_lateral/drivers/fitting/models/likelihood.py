@@ -20,7 +20,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
 
@@ -196,22 +195,21 @@ def _maximise_likelihood(sums: DriverSums, start: FloatArray, sizes: FloatArray)
 
     weighted, steps = sums.weighted(sizes), NUDGE * np.eye(len(start))
 
-    def cost(parameters: FloatArray) -> FloatArray:
-        return sums.cost(parameters, weighted)
-
-    def cost_and_slope(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        there = parameters[..., None, :]
-        costs = cost(np.concatenate([there, there + steps, there - steps], axis=-2))
-        return costs[..., 0], (costs[..., 1 : len(start) + 1] - costs[..., len(start) + 1 :]) / (2.0 * NUDGE)
+    def cost(parameters: FloatArray) -> float:
+        return float(sums.cost(parameters, weighted))
 
     def slope(parameters: FloatArray) -> FloatArray:
-        return cost_and_slope(parameters)[1]
+        there = parameters[..., None, :]
+        ahead, behind = np.split(
+            sums.cost(np.concatenate([there + steps, there - steps], axis=-2), weighted), 2, axis=-1
+        )
+        return np.asarray((ahead - behind) / (2.0 * NUDGE))
 
     optimum = minimize(
-        cast(Any, cost_and_slope),  # of one point: a number and a slope
+        cost,
         start,
         method="L-BFGS-B",
-        jac=True,
+        jac=slope,
         bounds=[(-FARTHEST, FARTHEST)] * len(start),
         options={"maxiter": MAXIMUM_TURNS, "gtol": FLATNESS, "ftol": 0.0},
     )
