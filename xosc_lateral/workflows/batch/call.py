@@ -26,6 +26,7 @@ from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
+from xosc_lateral.workflows.inputs import is_url
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
@@ -102,6 +103,9 @@ def convert_many(
         inputs = list(scenarios)
     else:
         inputs = list(read_request_table(scenarios, settings, variants=variants))
+    for place in (*inputs, output):
+        if is_url(place):
+            raise FormatError("a batch needs a folder: mount the bucket; one scenario goes without", path=place)
     number, parts = (1, 1) if shard is None else read_shard(shard)
     whole = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
     if not len(whole):

@@ -31,7 +31,7 @@ from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChan
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
-from xosc_lateral.workflows.given import DocumentLike, given
+from xosc_lateral.workflows.inputs import DocumentLike, is_url, open_url, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
@@ -61,8 +61,9 @@ def convert(
         OpenDRIVE file, whatever the scenario says; roads and catalogs by their names, as the scenario writes them or
         without folders. What is in memory, or has such a mapping, reads nothing else from a disk.
     output : str or Path, optional
-        File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
-        references as seen from the scenario's folder. Those of a scenario in memory stay as they are written.
+        File, or folder, to write to, or a URL (``s3://...``, through fsspec). Without it nothing is written;
+        `Conversion.data` holds what would be, with file references as seen from the scenario's folder. Those of a
+        scenario in memory stay as they are written.
     variant : int
         From 1; each has other offsets.
     report : str or Path, optional
@@ -79,9 +80,10 @@ def convert(
     """
     if variant < 1:
         raise ValueError(f"variant {variant}, they count from 1")
-    inputs = given(scenario, options.pop("road", None))
+    inputs = scenario_input(scenario, options.pop("road", None))
     settings = ConvertSettings.of(**options, road=inputs.road)
-    source = inputs.path
+    source, url = inputs.path, output if isinstance(output, str) and is_url(output) else ""
+    output = None if url else output
     # without an output, file references in the bytes are as from the source's folder
     target = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
@@ -96,6 +98,9 @@ def convert(
             saves=output is not None,
         )
         conversion.held = inputs.held
+        if url:
+            with open_url(url, "wb") as file:
+                file.write(conversion.data)
         if page is not None:
             conversion.write_report(page, force=force)
     return conversion

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.workflows.given import DocumentLike, RoadLike, given, several
+from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input, several
 from xosc_lateral.workflows.options import PathLike, Paths, declare_options, flag
 from xosc_lateral.workflows.options import paths as as_paths
 
@@ -111,7 +111,7 @@ def detect(
     from xosc_lateral.workflows.detection.tuning import in_order, read_goal, set_at_home
 
     inputs = [
-        given(one, road, f"scenario_{number}" if number > 1 else "scenario")
+        scenario_input(one, road, f"scenario_{number}" if number > 1 else "scenario")
         for number, one in enumerate(several(sources), start=1)
     ]
     paths, homes, trainers = [one.path for one in inputs], as_paths(home), as_paths(train)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.given import DocumentLike, RoadLike, given
+from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
 from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 
@@ -50,7 +50,7 @@ def play(
     from xosc_lateral.workflows.conversion.load import play_scenario
 
     values = {name: str(value) for name, value in (parameters or {}).items()}
-    inputs = given(scenario, road)
+    inputs = scenario_input(scenario, road)
     return Playback(
         play_scenario(
             inputs.path,
