@@ -23,6 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
+    "dossier": "workflows.dossier.call",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
@@ -56,6 +57,7 @@ _HOME = {
     "LoopPlan": "workflows.profiles.loop",
     "Detection": "workflows.detection.detection",
     "Sight": "workflows.detection.sight",
+    "Dossier": "workflows.dossier.call",
     "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -80,6 +82,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "close_loop",
     "plan_loop",
     "detect",
+    "dossier",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -113,6 +116,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "LoopPlan",
     "Detection",
     "Sight",
+    "Dossier",
     "ImportedDrives",
     "XoscLateralError",
     "FormatError",
@@ -143,6 +147,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.detection.sight import Sight
+    from xosc_lateral.workflows.dossier.call import Dossier, dossier
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic

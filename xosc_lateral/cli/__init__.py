@@ -35,6 +35,7 @@ VERBS = {
     "close-loop": "Find and add what a profile lacks.",
     "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",
+    "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",

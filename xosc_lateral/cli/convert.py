@@ -67,7 +67,7 @@ def convert(
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
     report = batch.get("report")
-    if len(scenario) == 1 and is_single(scenario[0]):
+    if len(scenario) == 1 and is_single(scenario[0]) and batch.get("shard") is None:
         limits = {"timeout": batch["job_timeout"], "memory": batch["job_memory"]}
         _convert_one(Path(scenario[0]), output, options, limits, batch["variants"], report, osi, summary, reply)
         return

@@ -75,9 +75,17 @@ class Batch:
     jobs: tuple[Job, ...]  # by name
     left_out: tuple[tuple[Path, DocumentKind], ...] = ()  # found, but catalogs, or outputs of former conversions
     notes: tuple[str, ...] = ()  # what a user has to know before it begins, a line each
+    shard: str = ""  # which part of the whole: "2-of-8"
+    elsewhere: frozenset[str] = frozenset()  # names of the jobs of other parts
 
     def __len__(self) -> int:
         return len(self.jobs)
+
+    def part(self, number: int, count: int) -> Batch:
+        """One of `count` parts, from 1. Neighbours by name stay together: variants of a scenario are played once."""
+        begin, end = (len(self) * edge // count for edge in (number - 1, number))
+        others = frozenset(job.name for job in (*self.jobs[:begin], *self.jobs[end:]))
+        return replace(self, jobs=self.jobs[begin:end], shard=f"{number}-of-{count}", elsewhere=others)
 
 
 def plan_batch(
