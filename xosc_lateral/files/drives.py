@@ -39,6 +39,7 @@ from xosc_lateral.files.columns import (
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping, standard_sources
+from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.tables import frame_of, read_table
 
 LABELS = ("drive", "driver", "recording")  # columns that say which drive a row is of, and whose
@@ -65,7 +66,7 @@ def read_drives(
     `lost` counts those in no drive, by reason.
     """
     known = as_mapping(mapping)
-    files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    files = inputs_of([paths] if isinstance(paths, str | Path) else paths)
     if twice := {str(path) for path in files if files.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
     return with_distinct_names(

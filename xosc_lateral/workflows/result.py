@@ -159,13 +159,14 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
     from xosc_lateral.files.mapping import as_mapping
+    from xosc_lateral.files.remote import inputs_of
     from xosc_lateral.files.tables import frame_of
 
     several = isinstance(drives, Sequence) and not isinstance(drives, str | Path | Drive)
     items: list[Any] = list(drives) if several else [drives]  # type: ignore[arg-type]
     mapping = as_mapping(columns)
-    files, lost = [Path(item) for item in items if isinstance(item, str | Path)], Counter[str]()
-    if len(files) == len(items):
+    files, lost = inputs_of(item for item in items if isinstance(item, str | Path)), Counter[str]()
+    if all(isinstance(item, str | Path) for item in items):
         every = read_drives(files, mapping, lost)
         return GivenDrives(every, parsed_hashes(files), tuple(files), +lost)
     read: list[Drive] = []
