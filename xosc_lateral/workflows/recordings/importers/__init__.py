@@ -29,6 +29,7 @@ from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.files.drives import file_label, file_labels
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
+from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.options import declare_options
@@ -88,7 +89,7 @@ def import_drives(
     FormatError
         An unknown format, or a source that can't be read.
     """
-    sources = as_paths(source)
+    sources = tuple(inputs_of(as_paths(source)))
     if not sources:
         raise ValueError("no source to import")
     read = find_importer(format)
