@@ -39,7 +39,7 @@ def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
 
 @pytest.fixture(scope="package", autouse=True)
 def _coarse_fits() -> Iterator[None]:
-    """Base models are fitted with an eighth of the simulated snippets: chance moves their spreads by 2 % instead of 1."""
+    """Base models are fitted with an eighth of the simulated snippets: chance moves their spreads by 2 %."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(autoregressive_fit, "SIMULATED_DRIVERS", autoregressive_fit.SIMULATED_DRIVERS // 8)
         patched.setattr(autoregressive_fit, "FOR_EACH", autoregressive_fit.FOR_EACH // 8)
