@@ -68,7 +68,7 @@ def test_the_conda_recipe_says_what_pyproject_says() -> None:
 
 
 def test_the_action_runs_as_bash_runs_it(tmp_path: Path) -> None:
-    """Its steps but for the installation, in their order, with their environment; nothing that is stated becomes code."""
+    """Its steps but for the installation, in their order, with their environment; no input becomes code."""
     action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
     stated = {"scenarios": "in", "output": "out it", "options": "--seed 2 --variants 2 --time-limit 3", "shard": "1/1"}
     assert stated.keys() <= action["inputs"].keys() and action["runs"]["using"] == "composite"
