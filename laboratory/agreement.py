@@ -202,6 +202,36 @@ class Tally:
         )
 
 
+def compared(
+    path: Path,
+    esmini: Path,
+    step: float,
+    limit: float,
+    tally: Tally,
+    *,
+    allowed: Iterable[Path | str] = (),
+    switches: Sequence[str] = (),
+) -> None:
+    """Count one scenario, and print what differs; `allowed`: where its road may lie."""
+    theirs = reference_rows(esmini, path, step, limit, switches)
+    if theirs["time"].nunique() < 3:
+        tally.not_played_there += 1
+        return
+    try:
+        played = play_scenario(path, step=step, time_limit=limit, allowed=[Path(one) for one in allowed])
+        found = difference(theirs, own_rows(played), step, limit)
+    except XoscLateralError as error:
+        found = " ".join(str(error).split())
+    others = (reference_rows(esmini, path, step, limit, switches, seed) for seed in OTHER_SEEDS)
+    if found and any(difference(theirs, other, step, limit) for other in others):
+        tally.left_to_chance += 1
+        return
+    tally.agreeing += not found
+    tally.differing += bool(found)
+    if found:
+        print(f"{path.parent.name}/{path.name}: {found}", flush=True)
+
+
 def main() -> None:
     """Compare, print what differs and how many agree."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -219,24 +249,8 @@ def main() -> None:
     folders = [place for place in options.folder if place.is_dir()]
     tallies = {0: Tally(), 1: Tally()}
     for path in scenarios(options.folder, options.limit, options.half, options.without):
-        tally = tallies[half_of(path)]
-        run = (options.esmini.resolve(), path, options.step, options.time_limit, options.esmini_option)
-        theirs = reference_rows(*run)
-        if theirs["time"].nunique() < 3:
-            tally.not_played_there += 1
-            continue
-        try:
-            ours = own_rows(play_scenario(path, step=options.step, time_limit=options.time_limit, allowed=folders))
-            found = difference(theirs, ours, options.step, options.time_limit)
-        except XoscLateralError as error:
-            found = " ".join(str(error).split())
-        if found and any(difference(theirs, reference_rows(*run, seed), *run[2:4]) for seed in OTHER_SEEDS):
-            tally.left_to_chance += 1
-            continue
-        tally.agreeing += not found
-        tally.differing += bool(found)
-        if found:
-            print(f"{path.parent.name}/{path.name}: {found}", flush=True)
+        run = (options.esmini.resolve(), options.step, options.time_limit)
+        compared(path, *run, tallies[half_of(path)], allowed=folders, switches=options.esmini_option)
     whole = Tally(*(sum(amounts) for amounts in zip(*(astuple(tally) for tally in tallies.values()), strict=True)))
     if options.half is None:
         for half, tally in tallies.items():

@@ -174,6 +174,37 @@ def test_a_vertex_says_how_fast_the_car_is_there_from_1_4_on(tmp_path: Path) -> 
     assert np.median(acceleration[(time > 1.2) & (time < 3.8)]) == pytest.approx(-10.0 / 3.0, rel=0.01)
 
 
+FOLLOWED = (
+    '<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="t" closed="false"><Shape>'
+    "<Polyline>{vertices}{more}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference><None/></TimeReference>"
+    '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
+)
+
+
+def test_of_what_1_4_adds_all_is_read_or_named(tmp_path: Path) -> None:
+    """`pi` and the permanent layer are meant as written; the way between vertices is up to the player."""
+    moved = '<Motion speed_longitudinal="9"/>'
+    vertices = "".join(
+        f'<Vertex><Position><WorldPosition x="{x}" y="-1.5"/></Position>{moved}</Vertex>' for x in (60, 110)
+    )
+    follow = FOLLOWED.format(vertices=vertices, more="<Interpolation/>")
+    where = teleport(s="${10 * pi / pi}")
+    placed = {layer: where.replace("roadId", f'layer="{layer}" roadId') for layer in ("permanent", "temporary")}
+    entities = entity("Ego") + entity("B")
+    scenario = {
+        layer: scenario_text(
+            minor=4,
+            entities=entities,
+            init=private("Ego", placed["permanent"], follow) + private("B", placed[layer]),
+        )
+        for layer in placed
+    }
+    remarks = {layer: read_scenario(write_scenario(tmp_path / layer, text)).remarks for layer, text in scenario.items()}
+    said = {layer: " ".join(one.reason for one in each) for layer, each in remarks.items()}
+    assert all("Interpolation leaves" in text and "Motion is not read" in text for text in said.values()), said
+    assert "layer is not read" in said["temporary"] and "layer is" not in said["permanent"]
+
+
 def test_an_entry_takes_the_place_of_its_reference(tmp_path: Path) -> None:
     folder = tmp_path / "catalogs"
     folder.mkdir()

@@ -94,7 +94,7 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
     if settings["player"] is Player.CARLA and settings["mode"] is OutputMode.LANE_OFFSET:
-        raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
+        raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--player")
 
 
 def _convert_one(

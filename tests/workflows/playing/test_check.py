@@ -114,3 +114,10 @@ def test_a_route_that_is_left_is_named(network: RoadNetwork) -> None:
 def test_a_waypoint_that_is_passed_in_another_lane_is_named(network: RoadNetwork) -> None:
     (what,) = said(network, car(), routes=(route(0, stops=((0, -1, 0.0), (0, -2, 50.0))),))
     assert what.startswith("'A' passes waypoint 2 of its route in lane -1 of road '1' instead of -2, at 2.5")
+
+
+def test_whoever_a_controller_steers_is_not_doubted(network: RoadNetwork) -> None:
+    """Its nominal way is not the one that it will take."""
+    steered = np.full(len(TIME), Activity.ACTIVE | Activity.STEERED, dtype=np.uint8)
+    assert not said(network, car(lane=np.where(TIME < 2.95, -1, -2), activity=steered))
+    assert not said(network, car(y=np.where(TIME < 2.95, -1.75, 0.6), activity=steered))

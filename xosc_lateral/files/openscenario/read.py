@@ -52,19 +52,23 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
 
 
 _NEWER = {
-    "Interpolation": "is not read: straight pieces join the vertices",
-    "layer": "is not read: the lane of that id is meant, whatever its layer",
+    "Interpolation": "leaves the way between vertices to the player: straight pieces join them",
+    "Motion": "is not read: vertices without a time are driven through at the entity's own speed",
+    "layer": "is not read: roads have the lanes of their permanent layer alone",
 }
-"""Since version 1.4: an element, and an attribute of lanes."""
+"""Since version 1.4: elements, and an attribute of lanes."""
 
 
 def remark_newer(root: XmlElement) -> list[Unsupported]:
-    """One remark for each kind of what version 1.4 has and nobody reads, at its first place."""
-    first_uses: dict[str, etree._Element] = {}
+    """One remark for each kind of what version 1.4 has and nobody plays, at its first place."""
+    found: dict[str, etree._Element] = {}
     for item in root.xml.iter("{*}*"):
-        for name in {local_name(item), *(str(name) for name in item.attrib if name == "layer")} & _NEWER.keys():
-            first_uses.setdefault(name, item)
-    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in first_uses.items())
+        name = "layer" if item.get("layer") == "temporary" else local_name(item)
+        parent = item.getparent()
+        is_timed = name == "Motion" and parent is not None and parent.get("time") is not None
+        if name in _NEWER and not is_timed:
+            found.setdefault(name, item)
+    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in found.items())
     return [Unsupported(place.element, place, f"{name} {_NEWER[name]}") for name, place in places]
 
 

@@ -230,8 +230,8 @@ class Fingerprints:
         values = settings.record(Path()) | {"strict": settings.strict}
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
-        for name, path in (("context", settings.context), ("road", settings.road)):
-            values[name] = None if path is None else _hash_or(path, MISSING_HASH)
+        stated = {name: getattr(settings, name) for name in values}
+        values |= {name: _hash_or(path, MISSING_HASH) for name, path in stated.items() if isinstance(path, Path)}
         return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:

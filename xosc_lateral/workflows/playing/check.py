@@ -12,7 +12,9 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array
 from xosc_lateral.base.rows import blocks, rows_where
+from xosc_lateral.world.motion.gaps import box_distance, corners
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion, Note
+from xosc_lateral.world.player.distances import HEIGHT_APART
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.place import Place
@@ -23,11 +25,10 @@ LEAP_DISTANCE = 0.3
 MAXIMUM_LATERAL_SPEED = 10.0
 """No lateral action is faster. [m/s]"""
 
-HEIGHT_APART = 2.5
-"""Entities further apart than this in z are on different levels of the road. [m]"""
-
 _PRESENT = np.uint8(Activity.ACTIVE)
-_GUIDED = np.uint8(Activity.LATERAL | Activity.TRAJECTORY | Activity.TELEPORTED)
+_LED = np.uint8(Activity.TRAJECTORY | Activity.STEERED)
+"""Along a trajectory, or by a controller, whose way is not decided here."""
+_GUIDED = _LED | np.uint8(Activity.LATERAL | Activity.TELEPORTED)
 
 
 def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str, str]) -> tuple[Note, ...]:
@@ -67,7 +68,8 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
         around = slice(rows.start - 1, rows.stop)
         step, speed, activity = np.diff(motion.time[around]), np.abs(motion.speed[around]), motion.activity[around]
         active = (activity & Activity.ACTIVE) != 0
-        whole = active[1:] & active[:-1] & ((activity[1:] & Activity.TELEPORTED) == 0)
+        unasked = (activity[1:] & (Activity.TELEPORTED | Activity.STEERED)) == 0
+        whole = active[1:] & active[:-1] & unasked
         driven = np.maximum(speed[1:], speed[:-1]) * step
         aside = LEAP_DISTANCE + MAXIMUM_LATERAL_SPEED * step
         return np.asarray(whole & (moved(around) > np.hypot(driven, aside)))
@@ -118,7 +120,7 @@ def _off_route(
             at = roads.index(road) if road in roads else len(roads)  # put there by the file
         elif road in roads[at + 1 :]:
             at += 1 + roads[at + 1 :].index(road)
-        elif network.roads[road].junction is None and 0 <= at < len(roads) - 1:
+        elif network.roads[road].junction is None and 0 <= at < len(roads) - 1 and not entity.activity[k] & _LED:
             where = f"on road '{network.road_ids[road]}', at {entity.time[k]:.2f} s"
             yield _note(f"'{entity.name}' leaves its route: it is {where}", route.place)
             return
@@ -126,8 +128,10 @@ def _off_route(
         on = np.flatnonzero(entity.road[begin:end] == road) + int(begin)
         side = np.sign(entity.s[on] - s)
         over = np.flatnonzero((np.diff(side) != 0) & (np.diff(on) == 1))
-        if len(over) and lane != 0 and not (entity.lane[on[over + 1]] == lane).any():
-            row = int(on[over[0] + 1])
+        over = on[over + 1]
+        led = (entity.lane[over] == lane) | ((entity.activity[over] & _GUIDED) != 0)
+        if len(over) and lane != 0 and not led.any():
+            row = int(over[0])
             beside = f"in lane {entity.lane[row]} of road '{network.road_ids[road]}' instead of {lane}"
             what = f"'{entity.name}' passes waypoint {number} of its route {beside}, at {entity.time[row]:.2f} s"
             yield _note(what, route.place)
@@ -153,24 +157,10 @@ def _overlaps(motion: NominalMotion, trailers: dict[str, str]) -> Iterator[Note]
 
 
 def _touch(entity: EntityMotion, other: EntityMotion, row: int) -> bool:
-    """Whether boxes overlap in the plane (no axis of either parts them), on the same level."""
+    """Whether boxes overlap in the plane, on the same level."""
     reach = sum(np.hypot(each.box.length, each.box.width) + abs(each.box.center_x) for each in (entity, other))
-    dx, dy = other.x[row] - entity.x[row], other.y[row] - entity.y[row]
-    if np.hypot(dx, dy) > reach or abs(other.z[row] - entity.z[row]) > HEIGHT_APART:
+    away = np.hypot(other.x[row] - entity.x[row], other.y[row] - entity.y[row])
+    if away > reach or abs(other.z[row] - entity.z[row]) > HEIGHT_APART:
         return False
-    shapes = [_corners(each, row) for each in (entity, other)]
-    for heading in (entity.heading[row], other.heading[row]):
-        for axis in ((np.cos(heading), np.sin(heading)), (-np.sin(heading), np.cos(heading))):
-            (low, high), (other_low, other_high) = ((s.min(), s.max()) for s in (shape @ axis for shape in shapes))
-            if high <= other_low or other_high <= low:
-                return False
-    return True
-
-
-def _corners(entity: EntityMotion, row: int) -> FloatArray:
-    """Shape (4, 2). [m]"""
-    box, heading = entity.box, entity.heading[row]
-    ahead = box.center_x + 0.5 * box.length * np.array([1, -1, -1, 1])
-    left = box.center_y + 0.5 * box.width * np.array([1, 1, -1, -1])
-    c, s = np.cos(heading), np.sin(heading)
-    return np.stack([entity.x[row] + ahead * c - left * s, entity.y[row] + ahead * s + left * c], axis=1)
+    a, b = (corners([(each, np.array([row]))]) for each in (entity, other))
+    return not box_distance(a, b)[0]

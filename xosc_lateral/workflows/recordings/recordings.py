@@ -231,7 +231,10 @@ def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLa
 def _made(road: WrittenRoad, tracks: Tracks, source: Path, *notes: str) -> RecordedTraffic:
     data, (vehicles, odd) = road.to_xml().encode(), _vehicles(tracks)
     network = parse_opendrive(data, road.name)
-    return RecordedTraffic(road.name, vehicles, network, data, f"{road.name}.xodr", (source,), (*notes, *odd))
+    return RecordedTraffic(
+        road.name, vehicles, network, data, f"{road.name}.xodr", (source,), (*notes, *tracks.notes, *odd),
+        dropped=tracks.dropped, read=len(tracks.x),
+    )  # fmt: skip
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -246,7 +249,10 @@ def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     short = _short(table["id"].astype(str).to_numpy(dtype=str))
     names = tuple(short[str(name)] for name in table["id"][np.r_[True, np.diff(vehicle) != 0]])
     place = x - made.origin[0], y - made.origin[1], np.full(len(x), np.nan)  # headings are not recorded
-    tracks = Tracks(names, vehicle, time, dlr_ht.STEP, *place, speed, length, kinds, width, height=height)
+    dropped = table.attrs["dropped"]
+    tracks = Tracks(
+        names, vehicle, time, dlr_ht.STEP, *place, speed, length, kinds, width, height=height, dropped=dropped
+    )
     note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
     return _made(made, tracks, source, note)
 
@@ -264,16 +270,15 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
     recording.require(levelx.HIGHD_COLUMNS)
     lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
-    table = table.sort_values(["id", "frame"], ignore_index=True)
+    table = recording.identified("id", "x", "y")
     meta = meta.set_index("id").loc[table["id"]]
     kind = recording.classes(meta)
     is_ahead = meta["drivingDirection"].to_numpy() == 2
-    vehicle, ids = table["id"].factorize()
     time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
     x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
     place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
-    when = tuple(map(str, ids)), vehicle, time, 1.0 / rate
-    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy())
+    when = tuple(table["name"].unique()), table["vehicle"].to_numpy(), time, 1.0 / rate
+    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy(), dropped=recording.dropped)
     middle = 0.5 * (upper[-1] + lower[0])
     sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
     left, right = (

@@ -120,14 +120,16 @@ def corners(boxes: Sequence[tuple[EntityMotion, NDArray[np.intp]]]) -> FloatArra
     """Corners of boxes on some rows each, counter-clockwise, one box after the other, shape (n, 4, 2). [m]"""
     x, y, heading = (np.concatenate([one.columns[name][rows] for one, rows in boxes])[:, None] for name in _POSE)
     counts = [len(rows) for _, rows in boxes]
-    length, width, centre = (np.repeat([getattr(one.box, name) for one, _ in boxes], counts)[:, None] for name in _SIZE)
+    length, width, centre, beside = (
+        np.repeat([getattr(one.box, name) for one, _ in boxes], counts)[:, None] for name in _SIZE
+    )
     ahead = centre + 0.5 * length * np.array([1.0, -1.0, -1.0, 1.0])
-    left = 0.5 * width * np.array([1.0, 1.0, -1.0, -1.0])
+    left = beside + 0.5 * width * np.array([1.0, 1.0, -1.0, -1.0])
     cos, sin = np.cos(heading), np.sin(heading)
     return np.stack([x + ahead * cos - left * sin, y + ahead * sin + left * cos], axis=-1)
 
 
-_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "center_x")
+_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "center_x", "center_y")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -35,6 +35,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
+from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.source import open_source
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import (
@@ -118,11 +119,15 @@ def import_dlr_ht(
             size = {"length_m": round(lane.end - lane.start, 1), "stretches": lane.passages}
             lanes.append({"carriageway": carriageway, "lane_index": index, **size, "centre_standard_error_m": known})
     about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": lanes}
+    about |= {"dropped": tracks.attrs["dropped"]}
     return imported(table, sources=[source], settings=asdict(settings), step=STEP, **about)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
-    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
+    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0.
+
+    `attrs["dropped"]`: rows of the files that are not in it, by reason.
+    """
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
@@ -131,8 +136,13 @@ def read_tracks(source: Path) -> pd.DataFrame:
     if frame.empty:
         raise NotEnoughDataError(f"{source}: no rows")
     frame["time"] = (stamps - stamps.min()).dt.total_seconds()
-    frame = frame.drop_duplicates(["id", "time"]).sort_values(["id", "time"], ignore_index=True)
-    frame["vehicle"] = np.unique(frame["id"].to_numpy(), return_inverse=True)[1]
+    labels, vehicle = np.unique(frame["id"].to_numpy(), return_inverse=True)
+    time, x, y = (frame[name].to_numpy() for name in ("time", "center_easting", "center_northing"))
+    known = identify([str(label) for label in labels], vehicle, time, x, y, path=source)
+    frame = frame.iloc[known.rows].reset_index(drop=True).assign(vehicle=known.vehicle)
+    if len(known.names) > len(labels):  # an identifier that is another vehicle's from some row on
+        frame["id"] = np.array(known.names, dtype=object)[known.vehicle]
+    frame.attrs["dropped"] = dict(known.dropped)
     return frame
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,13 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import TRUCKS, class_of
+from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.columns import comma_numbers
-from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
+from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, parts_of
 from xosc_lateral.files.tables import read_table, text_encoding
-from xosc_lateral.workflows.recordings.importers import paths_of
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -73,20 +77,36 @@ LISTED_TEXTS = 12  # so many different texts are written out at most
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
 
-def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
-    """Tables under standard names and units, as they can be read; without `drive`, a drive called after its file."""
-    known = as_mapping(mapping)
-    files = paths_of(sources)
-    made = []
+def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> ImportedDrives:
+    """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
+    again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
+    """
+    known, files = as_mapping(mapping), paths_of(sources)
+    made, lost, drives = list[pd.DataFrame](), Counter[str](), list[Drive]()
     for path, label in zip(files, file_labels(files), strict=True):
-        table = translated(read_table(path, known), known, path)
-        drives_of_table(table, TableMapping(), path)
-        if "drive" not in table:
-            table.insert(0, "drive", label)
+        read = read_table(path, known)
+        table = translated(read, known, path)
+        lost["not chosen"] += len(read) - len(table)
+        drives += drives_of_table(table, TableMapping(), path, lost)
+        names = np.empty(len(table), dtype=object)
+        for name, rows in rows_of_drives(table, path, label):
+            names[rows] = name
+        table = table.drop(columns=["drive", "recording"], errors="ignore")
+        table.insert(0, "drive", names)
         made.append(table)
-    for table, names in zip(made, labels_apart(files, [table["drive"].unique() for table in made]), strict=True):
-        table["drive"] = table["drive"].map(names)
-    return pd.concat(made, ignore_index=True)
+    for table, apart in zip(made, labels_apart(files, [table["drive"].unique() for table in made]), strict=True):
+        table["drive"] = table["drive"].map(apart)
+    table = pd.concat(made, ignore_index=True)
+    step = float(np.median(np.concatenate([np.diff(drive.time) for drive in drives])))
+    recorded = imported(
+        table.assign(state=KEPT_ROWS), format="table", sources=files, licence="your own recording", settings={},
+        step=step,
+    )  # fmt: skip
+    kept = sum(map(len, drives))
+    record = replace(
+        recorded.provenance, rows=dict(+Counter({KEPT_ROWS: kept, **lost})), hours=round(kept * step / 3600.0, 3)
+    )
+    return ImportedDrives(table, record)
 
 
 def propose_mapping(files: Sequence[Path]) -> str:
