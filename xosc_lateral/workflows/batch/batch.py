@@ -18,6 +18,7 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
+from xosc_lateral.files.output_paths import label_files
 from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
@@ -263,6 +264,8 @@ def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
         return "changed or gone"
     if job.page is not None and not job.page.is_file():
         return "its page is gone"
+    if job.labels and not all(path.is_file() for path in label_files(job.output)):
+        return "its labels are gone"
     if row.behaviour != BEHAVIOUR:
         return PROGRAM
     if row.settings != job.fingerprint or row.scenario != job.scenario:

@@ -57,6 +57,8 @@ def convert_many(
     shard: Annotated[str | None, flag("--shard", metavar="K/N",
         help="Part K of N, for a scheduler: all parts together leave what one run leaves.",
         rich_help_panel=BATCH)] = None,
+    labels: Annotated[bool, flag("--labels",
+        help="Beside each output OpenLABEL tags and an ASAM quality result (.xqar).")] = False,
     keep_old: Annotated[bool, flag("--keep-old", help="Leave outputs of older inputs or versions alone.",
         rich_help_panel=BATCH)] = False,
     force: bool = False,
@@ -107,7 +109,7 @@ def convert_many(
         if is_url(place):
             raise FormatError("a batch needs a folder: mount the bucket; one scenario goes without", path=place)
     number, parts = (1, 1) if shard is None else read_shard(shard)
-    whole = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
+    whole = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report, labels=labels)
     if not len(whole):
         raise FormatError(f"no scenario to convert{_left_out(whole)}", path=", ".join(map(str, inputs[:3])) or output)
     batch = whole if shard is None else whole.part(number, parts)

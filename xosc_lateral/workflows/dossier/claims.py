@@ -61,10 +61,10 @@ class Contents(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class State(StrEnum):
     """What is known of a claim."""
 
-    HOLDS = "holds, computed here"
+    HOLDS = "computed here and within bounds"
     BROKEN = "broken"
     STATED = "stated, not computed here"
-    UNTESTED = "claimed without a test"
+    UNTESTED = "without a test"
 
 
 class Finding(msgspec.Struct, frozen=True):
