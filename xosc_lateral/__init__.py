@@ -23,6 +23,7 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
+    "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
@@ -54,6 +55,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "LoopPlan": "workflows.profiles.loop",
+    "Health": "workflows.profiles.health",
     "Detection": "workflows.detection.detection",
     "Sight": "workflows.detection.sight",
     "ImportedDrives": "workflows.recordings.importers",
@@ -80,6 +82,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "close_loop",
     "plan_loop",
     "detect",
+    "check",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -111,6 +114,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Evaluation",
     "ClosedLoop",
     "LoopPlan",
+    "Health",
     "Detection",
     "Sight",
     "ImportedDrives",
@@ -153,6 +157,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
