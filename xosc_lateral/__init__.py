@@ -24,6 +24,7 @@ _HOME = {
     "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "dossier": "workflows.dossier.call",
+    "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
@@ -55,6 +56,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "LoopPlan": "workflows.profiles.loop",
+    "Health": "workflows.profiles.health",
     "Detection": "workflows.detection.detection",
     "Sight": "workflows.detection.sight",
     "Dossier": "workflows.dossier.call",
@@ -83,6 +85,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "plan_loop",
     "detect",
     "dossier",
+    "check",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -114,6 +117,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Evaluation",
     "ClosedLoop",
     "LoopPlan",
+    "Health",
     "Detection",
     "Sight",
     "Dossier",
@@ -158,6 +162,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample

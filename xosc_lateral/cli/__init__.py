@@ -28,6 +28,7 @@ VERBS = {
     "view": "Play a scenario in the browser.",
     "states": "Write the nominal motion as a table.",
     "segments": "Where offsets are sampled, and why not elsewhere.",
+    "check": "What tables of drives hold, and what can be fitted.",
     "fit": "Fit a profile to measured drives.",
     "sample": "Sample offsets alone, as a table.",
     "evaluate": "Score a profile on measured drives.",
@@ -43,8 +44,8 @@ VERBS = {
 """Name -> what it does."""
 
 VERB_MODULES = {
-    "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play", "view": "play",
-    "segments": "play", "template": "play", "import": "import_", "export": "live",
+    "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
+    "view": "play", "segments": "play", "template": "play", "import": "import_", "export": "live",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
