@@ -194,7 +194,9 @@ def check(plan: Plan, written: Written) -> Written:
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
-    def attempt(paths: Sequence[OffsetPath]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    def attempt(
+        paths: Sequence[OffsetPath], most: float
+    ) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
@@ -202,7 +204,7 @@ def check(plan: Plan, written: Written) -> Written:
         place = plan.source if held_at(plan.source) else plan.output
         output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = source_meaning.compare(
-            output, written.vehicles.trajectories, {path.entity for path in paths}
+            output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
         )
         return (trial, output, run), comparisons
 
