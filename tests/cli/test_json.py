@@ -55,6 +55,7 @@ def test_every_schema_is_one_and_is_listed():
         ),
         ("play", "states in/cut-in.xosc -o states.csv --time-limit 1"),
         ("segments", "segments in/cut-in.xosc"),
+        ("dossier", "dossier motorway -o dossier.html"),
         ("sample", "sample -p motorway --duration 20 -o offsets.csv"),
         ("sample", "sample -p motorway --like drives.csv -o snippets.parquet"),
         ("fit", "fit drives.csv -o fitted.json"),

@@ -10,39 +10,17 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
-from typing import IO, TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import IO, Any, TypeAlias
 from xml.etree import ElementTree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE
 from xosc_lateral.files.held import Held, hold
 from xosc_lateral.files.source import read_source
-from xosc_lateral.workflows.options import PathLike
 
-if TYPE_CHECKING:
-    from lxml import etree
-
-
-class Readable(Protocol):
-    """A file-like object."""
-
-    def read(self) -> bytes | str:
-        """Its content."""
-
-
-class Written(Protocol):
-    """An object of scenariogeneration."""
-
-    def get_element(self) -> Any:
-        """As a tree."""
-
-
-DocumentLike: TypeAlias = (
-    "PathLike | os.PathLike[str] | bytes | bytearray | memoryview | Readable | Written | ElementTree.Element "
-    "| etree._Element | etree._ElementTree"
-)
+DocumentLike: TypeAlias = Any
 """A path or URL; bytes, XML text, a file-like object, a parsed tree, a scenariogeneration object."""
-RoadLike: TypeAlias = "DocumentLike | Mapping[str, DocumentLike]"
+RoadLike: TypeAlias = Any
 """The road; or roads and catalogs by their names as seen from the scenario."""
 
 _KINDS = "a path, bytes, XML text, a file-like object, an lxml tree or a scenariogeneration object"
@@ -69,9 +47,9 @@ def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: s
     in_memory = _document(scenario, "scenario")
     of_road = None if road is None or isinstance(road, Mapping) else _document(road, "road")
     if in_memory is None and not isinstance(road, Mapping) and of_road is None:
-        return ScenarioInput(Path(scenario), None if road is None else Path(road))  # type: ignore[arg-type]
+        return ScenarioInput(Path(scenario), None if road is None else Path(road))
     if in_memory is None:
-        path = Path(scenario)  # type: ignore[arg-type]
+        path = Path(scenario)
         name, data = path.name, read_source(path).data
     else:
         stated = scenario if is_url(scenario) else getattr(scenario, "name", "") if hasattr(scenario, "read") else ""

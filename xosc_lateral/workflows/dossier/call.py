@@ -192,8 +192,6 @@ class Dossier(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        import msgspec
-
         return {
             "package": f"xosc-lateral {__version__}",
             "subject": self.subject,
@@ -203,7 +201,7 @@ class Dossier(Result):
             "claims": [finding.to_dict() for finding in self.findings],
             "parts": {name: [list(row) for row in rows] for name, rows in self.parts.items()},
             "anomalies": known_anomalies(),
-            "tool_classification": msgspec.to_builtins(self._contents.tool),
+            "tool_classification": self._contents.tool,
             "versions": dict(self.versions),
         }
 

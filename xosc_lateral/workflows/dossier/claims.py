@@ -38,24 +38,13 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return low <= value <= (float("inf") if self.at_most is None else self.at_most)
 
 
-class Use(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A use of the tool, what can go wrong, and what finds it: ISO 26262-8, clause 11."""
-
-    use: str
-    error: str
-    impact: str
-    check: str
-    detection: str
-    level: str
-
-
 class Contents(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a dossier says; `clauses`: part -> what it answers."""
+    """What a dossier says; `clauses`: part -> what it answers; `tool`: uses, what can go wrong, and what finds it."""
 
     purpose: str = ""
     clauses: dict[str, list[str]] = {}
     claim: list[Claim] = []
-    tool: list[Use] = []
+    tool: list[dict[str, str]] = []
 
 
 class State(StrEnum):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -26,9 +26,6 @@ TEMPLATES = ("cut-in", "overtake-truck", "dense-traffic")
 """Shipped scenarios that claims are tried on: a vehicle under test that is cut in on, curves and trucks, ten cars."""
 
 SEEDS = (1, 2)
-
-STREAM_STEPS = 1500
-"""A stream is compared for so long: at 5 Hz five minutes."""
 
 DETECTED_VARIANTS = 5
 """Lifelike variants of each template, in which detectors count."""
@@ -68,7 +65,7 @@ class ProfileBench:
         with TemporaryDirectory() as folder:
             for name in TEMPLATES:
                 write_template(name, Path(folder) / "templates")
-            path = Path(folder) / f"{self.profile.name}.json"
+            path = Path(folder) / "profile.json"
             write_profile(self.profile, path)
             sources, profiles = Path(folder) / "templates", (str(path),)
             return cast("Detection", detect(sources, ego="none", variants=DETECTED_VARIANTS, profiles=profiles))
@@ -84,7 +81,7 @@ def _not_reproduced(bench: ProfileBench) -> float:
 
     with TemporaryDirectory() as folder:
         scenario, _ = write_template(TEMPLATES[0], folder)
-        profile = Path(folder) / f"{bench.profile.name}.json"
+        profile = Path(folder) / "profile.json"
         write_profile(bench.profile, profile)
         outputs = [Path(folder) / f"lifelike_{seed}.xosc" for seed in SEEDS]
         for seed, output in zip(SEEDS, outputs, strict=True):
@@ -113,22 +110,6 @@ def _new_trouble(bench: ProfileBench) -> float:
     return float(sum(made.movement.trouble for made, _ in bench.conversions))
 
 
-def _stream_difference(bench: ProfileBench) -> float:
-    from xosc_lateral.base.segment import Segment
-    from xosc_lateral.drivers.model.sampling import sample_offsets
-    from xosc_lateral.drivers.model.stream import OffsetStream
-
-    profile, n = bench.profile, STREAM_STEPS
-    stream, context = OffsetStream(profile, SEEDS[0]), {"speed": 30.0, "lane_width": profile.lane_width}
-    for _ in range(stream.preview_steps):
-        stream.look(context)
-    offsets = np.array([stream.step(context) for _ in range(n - stream.preview_steps)])
-    columns = {name: np.full(n, value) for name, value in context.items()}
-    time = np.arange(n, dtype=np.float64) * profile.model.step
-    at_once = sample_offsets(profile, Segment(time, columns["lane_width"], columns["speed"], columns), SEEDS[0])
-    return float(np.abs(offsets - at_once[: len(offsets)]).max())
-
-
 def _short_ratio(bench: ProfileBench) -> float | None:
     return None if bench.evaluation is None else bench.evaluation.ratio
 
@@ -150,7 +131,6 @@ PROFILE_MEASURES: Mapping[str, Measure] = {
     "playback_error": _playback_error,
     "event_shift": _event_shift,
     "new_trouble": _new_trouble,
-    "stream_difference": _stream_difference,
     "short_ratio": _short_ratio,
     "long_ratio": _long_ratio,
 }
@@ -163,11 +143,11 @@ def stated_by(profile: DriverProfile) -> dict[str, float]:
     return {name: value for name, value in figures.items() if value is not None}
 
 
-class FolderBench:
+class FolderBench(NamedTuple):
     """A folder of outputs, and its manifest."""
 
-    def __init__(self, folder: Path, rows: tuple[ManifestRow, ...]) -> None:
-        self.folder, self.rows = folder, rows
+    folder: Path
+    rows: tuple[ManifestRow, ...]
 
 
 def _failed_outputs(bench: FolderBench) -> float:

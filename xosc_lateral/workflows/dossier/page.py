@@ -49,13 +49,7 @@ def dossier_page(dossier: Dossier, contents: Contents) -> str:
         "Impact, detection and confidence level follow from your own use: those below hold where the check that is "
         "named is part of it, and its result is looked at."
     )
-    page.table(
-        [
-            {"use": each.use, "what can go wrong": each.error, "impact": each.impact, "what finds it": each.check,
-             "detection": each.detection, "level": each.level}
-            for each in contents.tool
-        ]
-    )  # fmt: skip
+    page.table(contents.tool)
     begin("versions", "Versions and hashes")
     page.table([{"": name, "version": words} for name, words in dossier.versions.items()])
     return page.html({"subject": dossier.subject, "versions": dict(dossier.versions)})
