@@ -38,6 +38,7 @@ VERBS = {
     "profiles": "The library of driver profiles.",
     "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
+    "vary": "A scenario's lane changes as real drivers take them.",
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",
 }
@@ -45,7 +46,7 @@ VERBS = {
 
 VERB_MODULES = {
     "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
-    "view": "play", "segments": "play", "template": "play", "import": "import_", "export": "live",
+    "view": "play", "segments": "play", "template": "play", "vary": "play", "import": "import_", "export": "live",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
