@@ -23,6 +23,8 @@ _HOME = {
     "close_loop": "workflows.profiles.loop",
     "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
+    "dossier": "workflows.dossier.call",
+    "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
@@ -54,8 +56,10 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "LoopPlan": "workflows.profiles.loop",
+    "Health": "workflows.profiles.health",
     "Detection": "workflows.detection.detection",
     "Sight": "workflows.detection.sight",
+    "Dossier": "workflows.dossier.call",
     "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -80,6 +84,8 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "close_loop",
     "plan_loop",
     "detect",
+    "dossier",
+    "check",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -111,8 +117,10 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Evaluation",
     "ClosedLoop",
     "LoopPlan",
+    "Health",
     "Detection",
     "Sight",
+    "Dossier",
     "ImportedDrives",
     "XoscLateralError",
     "FormatError",
@@ -143,6 +151,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.detection.call import detect
     from xosc_lateral.workflows.detection.detection import Detection
     from xosc_lateral.workflows.detection.sight import Sight
+    from xosc_lateral.workflows.dossier.call import Dossier, dossier
     from xosc_lateral.workflows.live.c_driver import export_c
     from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
@@ -153,6 +162,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample

@@ -96,7 +96,7 @@ def _scenario(path: Path) -> None:
 
 def _trace(path: Path) -> None:
     _scenario(path.parent / "cut-in.xosc")
-    run("play", "cut-in.xosc", "--osi", path.name)
+    run("states", "cut-in.xosc", "--osi", path.name)
 
 
 def _scenarios(path: Path) -> None:

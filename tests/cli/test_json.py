@@ -51,10 +51,11 @@ def test_every_schema_is_one_and_is_listed():
         ("convert", "convert in/cut-in.xosc -o one.xosc --report one.html --time-limit 5"),
         (
             "convert",
-            "convert in/cut-in.xosc -o two.xosc --ego none --only Ego --profile motorway-refined --time-limit 5",
+            "convert in/cut-in.xosc -o two.xosc --ego none --enrich Ego --profile motorway-refined --time-limit 5",
         ),
-        ("play", "play in/cut-in.xosc -o states.csv --time-limit 1"),
+        ("play", "states in/cut-in.xosc -o states.csv --time-limit 1"),
         ("segments", "segments in/cut-in.xosc"),
+        ("dossier", "dossier motorway -o dossier.html"),
         ("sample", "sample -p motorway --duration 20 -o offsets.csv"),
         ("sample", "sample -p motorway --like drives.csv -o snippets.parquet"),
         ("fit", "fit drives.csv -o fitted.json"),

@@ -149,7 +149,7 @@ def test_a_folder_is_meant_by_a_slash_and_by_being_there(
     assert sorted(path.name for path in Path("new").iterdir()) == ["cut-in.html", "cut-in.xosc"]
     assert main(["convert", "cut-in.xosc", "-o", ".", "--time-limit", "5"]) == 0
     assert Path("cut-in_lifelike.xosc").exists()
-    assert main(["play", "cut-in.xosc", "-o", "new", "--time-limit", "1"]) == 0
+    assert main(["states", "cut-in.xosc", "-o", "new", "--time-limit", "1"]) == 0
     assert Path("new/cut-in.csv").exists()
 
 
@@ -159,13 +159,13 @@ def test_standard_output_gets_what_the_file_would_hold(
     monkeypatch.chdir(tmp_path)
     assert main(["template", "write", "cut-in", "-o", "."]) == 0
     assert main(["convert", "cut-in.xosc", "-o", "same.xosc", "--time-limit", "5", "-q"]) == 0
-    assert main(["play", "cut-in.xosc", "-o", "same.csv", "--time-limit", "1", "-q"]) == 0
+    assert main(["states", "cut-in.xosc", "-o", "same.csv", "--time-limit", "1", "-q"]) == 0
     capfdbinary.readouterr()
     assert main(["convert", "cut-in.xosc", "-o", "-", "--time-limit", "5"]) == 0
     out, err = capfdbinary.readouterr()
     assert out == Path("same.xosc").read_bytes()
     assert b"segments" in err
-    assert main(["play", "cut-in.xosc", "-o", "-", "--time-limit", "1"]) == 0
+    assert main(["states", "cut-in.xosc", "-o", "-", "--time-limit", "1"]) == 0
     assert capfdbinary.readouterr().out == Path("same.csv").read_bytes()
 
 
@@ -200,7 +200,7 @@ def test_only_leaves_the_others_as_they_are(
     scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(scenario.parent)
-    assert main(["convert", "cut-in.xosc", "-o", "one.xosc", "--only", "Ego", "--ego", "none", "-q"]) == 0
+    assert main(["convert", "cut-in.xosc", "-o", "one.xosc", "--enrich", "Ego", "--ego", "none", "-q"]) == 0
     written = Path("one.xosc").read_text()
     assert written.count("<FollowTrajectoryAction>") == 1
     assert "<LaneChangeAction>" in written
@@ -210,9 +210,9 @@ def test_only_leaves_the_others_as_they_are(
     ("words", "said"),
     [
         (["--version", "1.5"], "1.0, 1.1, 1.2, 1.3, 1.4"),
-        (["--for", "carla", "--version", "1.2"], "1.0 alone"),
-        (["--for", "carla", "--mode", "lane-offset"], "--mode trajectory"),
-        (["--for", "sumo"], "standard"),
+        (["--player", "carla", "--version", "1.2"], "1.0 alone"),
+        (["--player", "carla", "--mode", "lane-offset"], "--mode trajectory"),
+        (["--player", "sumo"], "standard"),
     ],
 )
 def test_what_can_not_be_written_is_wrong_usage(
@@ -227,7 +227,7 @@ def test_a_target_is_in_the_json_and_in_the_file(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "out.xosc"
-    assert main(["convert", str(scenario), "-o", str(output), "--for", "carla", "--json", "--time-limit", "3"]) == 0
+    assert main(["convert", str(scenario), "-o", str(output), "--player", "carla", "--json", "--time-limit", "3"]) == 0
     provenance = json.loads(capsys.readouterr().out)["provenance"]
     assert (provenance["options"]["player"], provenance["version"]) == ("carla", "1.0")
     assert 'revMinor="0"' in output.read_text(encoding="utf-8")
@@ -286,3 +286,21 @@ def test_a_damaged_table_is_refused_in_words_of_our_own(tmp_path, capsys, name, 
     assert main(["fit", str(tmp_path / name), "-o", str(tmp_path / "x.json")]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and not re.search("footer|parse|end-of-stream|C error|codec", err), err
+
+
+def test_last_releases_words_are_known(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    written = []
+    for verb, player, enrich, attempts in (
+        ("play", "--for", "--only", "--resample"),
+        ("states", "--player", "--enrich", "--attempts"),
+    ):
+        assert main([verb, "cut-in.xosc", "-o", "s.csv", "--time-limit", "1", "-q"]) == 0
+        words = [player, "esmini", f"{enrich}=Ego", attempts, "2", "--ego", "none", "--time-limit", "1", "-q"]
+        assert main(["convert", "cut-in.xosc", "-o", "c.xosc", *words]) == 0
+        written.append([Path(name).read_bytes() for name in ("s.csv", "c.xosc")])
+    assert written[0] == written[1]
+    assert main(["convert", "-o", "out/", "--", "cut-in.xosc", "--for", "esmini"]) != 0  # files of these names
+    assert "--for" in capsys.readouterr().err

@@ -23,7 +23,7 @@ def scenario(tmp_path: Path) -> Path:
 
 
 def test_it_writes_the_table_and_tells_what_was_not_played(scenario: Path, tmp_path: Path) -> None:
-    result = RUN.invoke(app, ["play", str(scenario), "-o", str(tmp_path / "states.csv"), "--step", "0.1"])
+    result = RUN.invoke(app, ["states", str(scenario), "-o", str(tmp_path / "states.csv"), "--step", "0.1"])
     assert result.exit_code == 0
     lines = (tmp_path / "states.csv").read_text().splitlines()
     assert lines[0] == "time,name,x,y,z,h,speed,road,lane,offset_t,s"
@@ -33,7 +33,7 @@ def test_it_writes_the_table_and_tells_what_was_not_played(scenario: Path, tmp_p
 
 
 def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
-    result = RUN.invoke(app, ["play", str(scenario), "-o", str(tmp_path / "s.csv"), "--time-limit", "1"])
+    result = RUN.invoke(app, ["states", str(scenario), "-o", str(tmp_path / "s.csv"), "--time-limit", "1"])
     assert result.exit_code == 0
     assert (tmp_path / "s.csv").read_text().splitlines()[-1].startswith("1.000,")
     assert "time limit" in result.stderr
@@ -62,7 +62,7 @@ def test_a_batch_says_which_runs_are_cut_off(scenario: Path, tmp_path: Path) -> 
 
 
 def test_a_scenario_that_is_not_there_leaves_no_table(tmp_path: Path) -> None:
-    result = RUN.invoke(app, ["play", str(tmp_path / "none.xosc"), "-o", str(tmp_path / "s.csv")])
+    result = RUN.invoke(app, ["states", str(tmp_path / "none.xosc"), "-o", str(tmp_path / "s.csv")])
     assert result.exit_code != 0
     assert not (tmp_path / "s.csv").exists()
 
@@ -74,7 +74,7 @@ def test_a_missing_vehicle_catalog_is_an_error_when_strict(scenario: Path, tmp_p
     assert replaced
     scenario.write_text(text)
     table, enriched = tmp_path / "states.csv", tmp_path / "out.xosc"
-    usual = RUN.invoke(app, ["play", str(scenario), "-o", str(table), "--time-limit", "1"])
+    usual = RUN.invoke(app, ["states", str(scenario), "-o", str(table), "--time-limit", "1"])
     assert usual.exit_code == 0
     assert "played as a car of usual size" in usual.stderr
     table.unlink()

@@ -246,6 +246,6 @@ def test_the_site_builds_without_a_warning(tmp_path, monkeypatch):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     reference = (tmp_path / "site" / "reference" / "cli.html").read_text(encoding="utf-8")
-    assert "--resample" in reference and "close-loop" in reference
+    assert "--attempts" in reference and "close-loop" in reference
     python = (tmp_path / "site" / "reference" / "api.html").read_text(encoding="utf-8")
     assert "convert_many" in python and "time_limit" in python

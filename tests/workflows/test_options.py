@@ -15,7 +15,7 @@ from xosc_lateral.workflows.options import SHARED, declare_options, flag, option
 
 CALLS = {
     "fit": xl.fit, "sample": xl.sample, "evaluate": xl.evaluate, "close-loop": xl.close_loop, "detect": xl.detect,
-    "play": xl.play, "segments": xl.segments, "verify": xl.verify, "reproduce": xl.reproduce,
+    "states": xl.play, "segments": xl.segments, "verify": xl.verify, "reproduce": xl.reproduce,
 }  # fmt: skip
 
 
@@ -122,5 +122,5 @@ def test_a_road_that_is_there_and_broken_is_named_by_its_line(
     (scenario, _) = xl.write_template("cut-in", tmp_path)
     broken = tmp_path / "broken.xodr"
     broken.write_text("<OpenDRIVE", encoding="utf-8")
-    assert main(["play", str(scenario), "-o", "-", "--road", str(broken)]) == 1
+    assert main(["states", str(scenario), "-o", "-", "--road", str(broken)]) == 1
     assert capsys.readouterr().err.startswith(f"xosc-lateral: {broken}:1")

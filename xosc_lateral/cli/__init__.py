@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from signal import SIGINT
@@ -26,8 +26,9 @@ VERBS = {
     "verify": "Whether outputs are what would be made today.",
     "reproduce": "Make an output again from what it carries.",
     "view": "Play a scenario in the browser.",
-    "play": "Write the nominal motion as a table.",
+    "states": "Write the nominal motion as a table.",
     "segments": "Where offsets are sampled, and why not elsewhere.",
+    "check": "What tables of drives hold, and what can be fitted.",
     "fit": "Fit a profile to measured drives.",
     "sample": "Sample offsets alone, as a table.",
     "evaluate": "Score a profile on measured drives.",
@@ -35,6 +36,7 @@ VERBS = {
     "close-loop": "Find and add what a profile lacks.",
     "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",
+    "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",
@@ -42,10 +44,16 @@ VERBS = {
 """Name -> what it does."""
 
 VERB_MODULES = {
-    "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "view": "play", "segments": "play",
-    "template": "play", "import": "import_", "export": "live",
+    "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
+    "view": "play", "segments": "play", "template": "play", "import": "import_", "export": "live",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
+
+OLD_VERBS = {"play": "states"}
+"""What was the name of a verb in 0.2 -> its name."""
+
+OLD_OPTIONS = {"convert": {"--for": "--player", "--resample": "--attempts", "--only": "--enrich"}}
+"""Verb -> what was the name of an option of it in 0.2 -> its name."""
 
 TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
@@ -99,8 +107,19 @@ class _Verbs(TyperGroup):
         self.commands = {name: TyperCommand(name, short_help=does) for name, does in VERBS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        name, known, rest = super().resolve_command(ctx, args)
-        return name, known and verb(str(name)), rest
+        word = OLD_VERBS.get(args[0], args[0])
+        name, known, rest = super().resolve_command(ctx, [word, *args[1:]])
+        return name, known and verb(str(name)), [*_renamed(rest, OLD_OPTIONS.get(word, {}))]
+
+
+def _renamed(words: Sequence[str], names: Mapping[str, str]) -> Iterator[str]:
+    """Options by today's names; whatever comes behind `--` is none."""
+    for k, word in enumerate(words):
+        if word == "--":
+            yield from words[k:]
+            return
+        option, equals, value = word.partition("=")
+        yield names.get(option, option) + equals + value
 
 
 app = typer.Typer(

@@ -67,9 +67,10 @@ def convert(
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
     report = batch.get("report")
-    if len(scenario) == 1 and is_single(scenario[0]):
+    if len(scenario) == 1 and is_single(scenario[0]) and batch.get("shard") is None:
         limits = {"timeout": batch["job_timeout"], "memory": batch["job_memory"]}
-        _convert_one(Path(scenario[0]), output, options, limits, batch["variants"], report, osi, summary, reply)
+        source, variants, labels = Path(scenario[0]), batch["variants"], batch["labels"]
+        _convert_one(source, output, options, limits, variants, report, osi, summary, reply, labels=labels)
         return
     for option, stated in (("--osi", osi), ("--summary", summary)):
         if stated is not None:
@@ -93,16 +94,16 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
     if settings["player"] is Player.CARLA and settings["mode"] is OutputMode.LANE_OFFSET:
-        raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
+        raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--player")
 
 
 def _convert_one(
     source: Path, output: str | None, options: dict[str, Any], limits: Mapping[str, float], variants: int,
-    report: str | None, osi: str | None, summary: str | None, reply: Written,
+    report: str | None, osi: str | None, summary: str | None, reply: Written, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
-    from xosc_lateral.files.output_paths import STDOUT, claim, numbered, output_file
+    from xosc_lateral.files.output_paths import STDOUT, claim, label_files, numbered, output_file
     from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
@@ -116,7 +117,7 @@ def _convert_one(
             raise JobLimitError(f"{source}: {error}") from error
 
     if output == STDOUT:
-        if variants > 1 or reply.as_json or osi is not None or summary is not None:
+        if variants > 1 or reply.as_json or osi is not None or summary is not None or labels:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = limited(None, report=report)
         write_stdout(result.data)
@@ -135,6 +136,7 @@ def _convert_one(
         osi_wanted(trace)
         outputs, pages, traces, summaries = zip(*files, strict=True)
         both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        both += [path for one in outputs if labels and one is not None for path in label_files(one)]
         both += [path for one in summaries if one is not None for path in (one, *pictures_beside(one))]
         claim([*outputs, *pages, *both], [source], force=reply.force)
         unclean = False
@@ -143,6 +145,8 @@ def _convert_one(
                 result = limited(path, variant=variant, report=its_page)
                 if its_trace is not None:
                     result.write_osi(its_trace, force=True)
+                if labels and path is not None:
+                    result.write_labels(path, force=True)
                 if its_summary is not None:
                     result.write_summary(its_summary, force=True)
             reply.say(result)

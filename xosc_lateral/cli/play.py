@@ -1,4 +1,4 @@
-"""`xosc-lateral play`: the nominal motion as a table; `segments` of it; `view`: as a page; `template`: to start."""
+"""`xosc-lateral states`: the nominal motion as a table; `segments` of it; `view`: as a page; `template`: to start."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).
 
 
 @command(
-    app, "play", VERBS["play"],
-    "play cut-in.xosc -o states.csv", "play cut-in.xosc --osi cut-in_gt.mcap", "play cut-in.xosc -o states.parquet",
-    "play cut-in.xosc -o - | head",
+    app, "states", VERBS["states"],
+    "states cut-in.xosc -o states.csv", "states cut-in.xosc --osi cut-in_gt.mcap",
+    "states cut-in.xosc -o states.parquet", "states cut-in.xosc -o - | head",
 )
-def play(
+def states(
     scenario: Scenario, *,
     output: Annotated[str | None, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .",
         show_default=False)] = None,

@@ -27,6 +27,7 @@ DOCS_PAGES = {
     "close_loop": "docs/closing_the_loop.md",
     "convert": "docs/scenarios.md, docs/pipeline.md",
     "detect": "docs/how_to/detect.md",
+    "dossier": "docs/how_to/in_your_pipeline.md",
     "fit": "docs/model.md, docs/formats.md",
     "import_": "docs/real_data.md, docs/formats.md",
     "live": "docs/live.md",

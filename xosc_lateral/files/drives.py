@@ -34,11 +34,13 @@ from xosc_lateral.files.columns import (
     epoch_factor,
     indicators,
     listed,
+    no_time,
     numbers_of,
     plain_cells,
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import ColumnSource, MappingLike, TableMapping, as_mapping, standard_sources
+from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.tables import frame_of, read_table
 
 LABELS = ("drive", "driver", "recording")  # columns that say which drive a row is of, and whose
@@ -55,18 +57,21 @@ WHEEL_WIDTH = 2.5
 MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds levels, not a quantity
 
 
-def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
+def read_drives(
+    paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None, lost: Counter[str] | None = None
+) -> list[Drive]:
     """Read the drives of one or several tables, in the order of the files and of first appearance.
 
     `mapping`: what columns are called, and how tables are written, see `files.mapping`. A drive without a name is
-    called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a gap).
+    called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a gap);
+    `lost` counts those in no drive, by reason.
     """
     known = as_mapping(mapping)
-    files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
+    files = inputs_of([paths] if isinstance(paths, str | Path) else paths)
     if twice := {str(path) for path in files if files.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
     return with_distinct_names(
-        [drive for path in files for drive in drives_of_table(read_table(path, known), known, path)]
+        [drive for path in files for drive in drives_of_table(read_table(path, known), known, path, lost)]
     )
 
 
@@ -83,17 +88,31 @@ def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     ]
 
 
-def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame") -> list[Drive]:
+def drives_of_table(
+    table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame", lost: Counter[str] | None = None
+) -> list[Drive]:
     """Drives of a table that is in memory; `path` is what messages call it. Else see `read_drives`."""
-    path = Path(path)
-    table = translated(table, as_mapping(mapping), path)
+    try:
+        return _drives_of(frame_of(table), as_mapping(mapping), Path(path), Counter() if lost is None else lost)
+    except FormatError as error:
+        said = f"{error.element or ''} {error.what}"
+        if ("column" not in said and "--map" not in said) or not Path(path).suffix:
+            raise
+        what = f"{error.what}; all columns: xosc-lateral check {Path(path).name} --report PAGE.html"
+        raise FormatError(what, path=error.path, line=error.line, element=error.element) from error
+
+
+def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Counter[str]) -> list[Drive]:
+    read, table = len(table), translated(table, mapping, path)
+    lost["not chosen"] += read - len(table)
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns: dict[str, FloatArray] = {}
     for name in table.columns:
         columns |= {} if name in LABELS else _numeric_columns(name, table, path)
     if "time" not in columns:
-        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+        advice = no_time(table.columns, "--map time=COLUMN")
+        what = f"no column 'time'; there are {listed(columns)} (translate with {advice})"
         raise FormatError(what, path=path, line=1)
     if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
         needed = "needs distance_left and distance_right, or offset and lane_width"
@@ -101,8 +120,8 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
         raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     drives = []
-    for name, rows in _rows_of_drives(table, path):
-        drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
+    for name, rows in rows_of_drives(table, path):
+        drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path, lost)
         drivers = list(table["driver"].iloc[rows].dropna().unique()) if "driver" in table.columns else []
         if len(drivers) > 1:
             what = f"drive {name}: {drivers[0]} and {drivers[1]}; a drive has one driver"
@@ -117,7 +136,7 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
     """The table under standard names and in standard units; what is not mapped stays as it is."""
-    table = frame_of(table).rename(columns=lambda name: str(name).strip())
+    table = table.rename(columns=lambda name: str(name).strip())
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
         raise FormatError(f"column {twice[0]!r} appears twice", path=path, line=1)
@@ -125,7 +144,9 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
-    table = chosen_rows(table, mapping.missing, mapping.rows, path)
+    table = chosen_rows(
+        table, mapping.missing, mapping.rows, path, mapping.columns.get("time", ColumnSource("time")).column
+    )
     taken = {source.column for source in mapping.columns.values()} | mapping.columns.keys()
     free = [name for name in table.columns if name not in taken]
     usual = standard_sources(free, {name: usual for name, usual in STANDARD.items() if name not in taken}, path)
@@ -204,10 +225,13 @@ def _holds_levels(name: str, values: FloatArray) -> bool:
     return bool(np.all(known == np.round(known)) and len(np.unique(known)) <= MAX_LEVELS)
 
 
-def _rows_of_drives(table: pd.DataFrame, path: Path) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Rows of each drive in file order: a recording's drive, or what of it a clock counts that begins again."""
+def rows_of_drives(table: pd.DataFrame, path: Path, label: str | None = None) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Name and rows of each drive in file order: a recording's drive, or what of it a clock counts that begins again.
+
+    `label`: the file's, by which drives without a name are called.
+    """
     labels = [name for name in ("recording", "drive") if name in table.columns]
-    codes, names = np.zeros(len(table), dtype=np.int64), [file_label(path)]
+    codes, names = np.zeros(len(table), dtype=np.int64), [label or file_label(path)]
     for name in labels:
         if (missing := table[name].isna()).any():
             raise FormatError("no value", path=path, line=int(np.argmax(missing)) + 2, element=f"column {name!r}")

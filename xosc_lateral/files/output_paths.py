@@ -113,6 +113,11 @@ def numbered(path: Path, variant_index: int, variants: int) -> Path:
     return path.with_name(f"{path.stem}_{variant_index + 1:0{digits}d}{path.suffix}")
 
 
+def label_files(output: Path) -> tuple[Path, Path]:
+    """Where tags and quality result of an output go: beside it."""
+    return output.with_suffix(".openlabel.json"), output.with_suffix(".xqar")
+
+
 # ---- whether a file is one that this package wrote: each format says so in its own place
 SIDECAR_SUFFIX = ".json"  # beside ``out.csv`` lies ``out.csv.json``: a comment inside a CSV would stop most readers
 PACKAGE = b"xosc-lateral"
@@ -177,6 +182,7 @@ _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".json": _own_json,
     ".parquet": _own_parquet,
     ".html": lambda path: b'content="xosc-lateral ' in _head(path),
+    ".xqar": lambda path: b'name="xosc-lateral"' in _head(path),
     ".md": lambda path: MARKDOWN_MARK.encode() in _head(path),
     ".svg": lambda path: SVG_MARK.encode() in _head(path),
     ".png": lambda path: PACKAGE in _head(path),
@@ -186,7 +192,10 @@ _CHECKS: dict[str, Callable[[Path], bool]] = {
 
 
 def _is_ours(values: dict[str, Any]) -> bool:
-    return str(values.get("package", "")).startswith("xosc-lateral")
+    tags = values.get("openlabel")
+    metadata = tags.get("metadata") if isinstance(tags, dict) else None
+    package = metadata.get("annotator", "") if isinstance(metadata, dict) else values.get("package", "")
+    return str(package).startswith("xosc-lateral")
 
 
 def _head(path: Path) -> bytes:

@@ -86,10 +86,15 @@ def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
     return {"package": f"xosc-lateral {__version__}", **provenance}
 
 
-COLUMNS = ("time", "name", "x", "y", "z", "h", "speed", "road", "lane", "offset_t", "s")
-"""[s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane centre along +t, [m]."""
+COLUMNS = {
+    "time": "%.3f", "name": "%s", "x": "%.4f", "y": "%.4f", "z": "%.4f", "h": "%.6f", "speed": "%.4f", "road": "%s",
+    "lane": "%d", "offset_t": "%.4f", "s": "%.4f",
+}  # fmt: skip
+"""Name -> how it is written; [s], -, [m], [m], [m], [rad], [m/s], road id, lane id, [m] from the lane's centre along
++t, [m]. `_columns` has their values."""
 
-_NUMBERS = "%.3f,%s,%.4f,%.4f,%.4f,%.6f,%.4f,%s,%d,%.4f,%.4f"
+RECOGNISED_BY = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s")
+"""What every table of states has, of a played scenario or of live drivers: one with more is one, too."""
 
 
 def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
@@ -101,9 +106,12 @@ def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
 
 
 def _lines(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:
-    columns = [values.tolist() for values in _columns(motion, network, _quoted).values()]
+    columns, written = (
+        [values.tolist() for values in _columns(motion, network, _quoted).values()],
+        ",".join(COLUMNS.values()),
+    )
     for row, activity in zip(zip(*columns, strict=True), motion.activity.tolist(), strict=True):
-        yield _NUMBERS % row if activity & Activity.ACTIVE else ""
+        yield written % row if activity & Activity.ACTIVE else ""
 
 
 def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:

@@ -197,7 +197,8 @@ def _measured(fit: Mapping[str, Any], hours: float) -> str:
     )
     if "drivers" in fit:
         text += f" of {fit['drivers']:g} driver{'s' if fit['drivers'] > 1 else ''}"
-    return text + (f"; {100 * fit['frozen']:.1f} % of the rows repeat others: frozen" if "frozen" in fit else "")
+    left_out = ", ".join(f"{count} {reason}" for reason, count in fit.get("left_out", {}).items())
+    return f"{text}; rows left out: {left_out}" if left_out else text
 
 
 FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")  # that can be set and searched for

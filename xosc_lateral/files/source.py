@@ -27,6 +27,7 @@ from typing import IO, Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
+from xosc_lateral.files.held import held_bytes
 
 LOG = getLogger(__name__)
 IN_MEMORY = 64_000_000  # files up to this are read once and parsed from memory [byte]
@@ -95,6 +96,12 @@ def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
 def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
     """Open an input file for reading. Raises `FormatError`."""
     path = Path(path)
+    if (held := held_bytes(path)) is not None:
+        if len(held) > limit.bytes:
+            raise FormatError(limit.refusal(len(held) / 1e6), path=path)
+        _remember(path, hash_of(held))
+        yield Source(path, io.BytesIO(held), len(held))
+        return
     with _opened(path) as file:
         before = os.fstat(file.fileno())
         if before.st_size > limit.bytes:
@@ -133,6 +140,8 @@ def take_over(path: Path, digest: str) -> None:
 
 def check_regular(path: Path) -> os.stat_result:
     """State of a regular file. Raises `FormatError`: It is not there, or something else."""
+    if (held := held_bytes(path)) is not None:
+        return os.stat_result((stat.S_IFREG | 0o444, 0, 0, 1, 0, 0, len(held), 0, 0, 0))
     try:
         state = path.stat()
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
@@ -242,6 +251,8 @@ def parsed_hash(path: Path) -> str:
     if path.is_dir():  # a table in parts
         parts = "".join(parsed_hash(part) for part in sorted(path.rglob("*")) if part.is_file())
         return hashlib.sha256(parts.encode()).hexdigest()
+    if (held := held_bytes(path)) is not None:
+        return hash_of(held)
     try:
         return last_read(path)
     except KeyError:

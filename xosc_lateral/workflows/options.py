@@ -49,6 +49,7 @@ class Option:
     cell: Cell | None = None  # reads the column of its name; None: a table has no such column
     prefix: str = ""  # prefix, entry: of columns that hold one entry each of a mapping
     entry: Cell | None = None
+    decides: bool = True  # on an output's bytes
 
     def value(self, name: str, stated: Any) -> Any:
         """The field's value; `ValueError` with the option's name before it."""
@@ -78,10 +79,11 @@ def option(
     cell: Cell | None = None,
     prefix: str = "",
     entry: Cell | None = None,
+    decides: bool = True,
     **words: Any,
 ) -> Any:
     """Declare a field that users can set; see `Option`."""
-    metadata = {"option": Option(read, flags, kind, words, cell, prefix, entry)}
+    metadata = {"option": Option(read, flags, kind, words, cell, prefix, entry, decides)}
     if isinstance(default, dict):
         return field(default_factory=dict, metadata=metadata)
     return field(default=default, metadata=metadata)

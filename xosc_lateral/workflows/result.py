@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -105,11 +106,14 @@ class GivenDrives:
         Name of each table -> SHA-256 of its bytes (of a frame: of its columns' values).
     files : tuple of Path
         Those of them that are files.
+    left_out : mapping of str to int
+        Rows of the tables that are in no drive, by reason.
     """
 
     drives: list[Drive]
     inputs: Mapping[str, str]
     files: tuple[Path, ...]
+    left_out: Mapping[str, int] = field(default_factory=dict)
 
     def valid_below(self, frequency: float | None) -> GivenDrives:
         """The same, where drives that don't state their band show driving below a frequency [Hz]."""
@@ -155,27 +159,29 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
     from xosc_lateral.files.mapping import as_mapping
+    from xosc_lateral.files.remote import inputs_of
     from xosc_lateral.files.tables import frame_of
 
     several = isinstance(drives, Sequence) and not isinstance(drives, str | Path | Drive)
     items: list[Any] = list(drives) if several else [drives]  # type: ignore[arg-type]
     mapping = as_mapping(columns)
-    files = [Path(item) for item in items if isinstance(item, str | Path)]
-    if len(files) == len(items):
-        return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
+    files, lost = inputs_of(item for item in items if isinstance(item, str | Path)), Counter[str]()
+    if all(isinstance(item, str | Path) for item in items):
+        every = read_drives(files, mapping, lost)
+        return GivenDrives(every, parsed_hashes(files), tuple(files), +lost)
     read: list[Drive] = []
     inputs: dict[str, str] = {}
     for number, item in enumerate(items, start=1):
         if isinstance(item, Drive):
             read.append(item)
         elif isinstance(item, str | Path):
-            read += read_drives(item, mapping)
+            read += read_drives(item, mapping, lost)
         else:
             name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
             frame = frame_of(item)
-            read += drives_of_table(frame, mapping, name)
+            read += drives_of_table(frame, mapping, name, lost)
             inputs[name] = frame_hash(frame)
-    return GivenDrives(with_distinct_names(read), parsed_hashes(files) | inputs, tuple(files))
+    return GivenDrives(with_distinct_names(read), parsed_hashes(files) | inputs, tuple(files), +lost)
 
 
 def frame_hash(frame: pd.DataFrame) -> str:

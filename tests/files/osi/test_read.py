@@ -277,7 +277,7 @@ def _elsewhere(made: list[Any]) -> list[Any]:
         (_not_a_number, "message 4: moving object 7: x nan"),
         (_without_time, "message 3: has no timestamp"),
         (_elsewhere, "no row lies in a driving lane of the trace: x from 0.0"),
-        (lambda made: made[:1], "no vehicle in two of 1 messages"),
+        (lambda made: made[:1], "no vehicle has two rows"),
         (lambda made: drives(lambda message: message), "has no lanes with boundaries: give the road with --road"),
     ],
 )

@@ -138,12 +138,12 @@ def test_same_motion_same_bytes_and_other_files_stay(tmp_path, network, motion) 
 def test_play_and_convert_write_traces(tmp_path: Path, capsys) -> None:
     scenario = str(ROOT / "templates" / "cut-in.xosc")
     trace = tmp_path / "cut-in.mcap"
-    assert main(["play", scenario, "--osi", str(trace), "--time-limit", "5"]) == 0
+    assert main(["states", scenario, "--osi", str(trace), "--time-limit", "5"]) == 0
     assert len(messages(trace)) == 251
-    assert main(["play", scenario, "--osi", str(trace), "--time-limit", "5"]) == 0  # its own file
+    assert main(["states", scenario, "--osi", str(trace), "--time-limit", "5"]) == 0  # its own file
     trace.write_bytes(b"somebody else's")
-    assert main(["play", scenario, "--osi", str(trace), "--time-limit", "5"]) == 1
-    assert main(["play", scenario, "--osi", str(tmp_path / "trace.txt")]) == 1
+    assert main(["states", scenario, "--osi", str(trace), "--time-limit", "5"]) == 1
+    assert main(["states", scenario, "--osi", str(tmp_path / "trace.txt")]) == 1
     assert "expected a name ending in .mcap or .osi" in capsys.readouterr().err
     out = tmp_path / "out.xosc"
     made = ["convert", scenario, "-o", str(out), "--osi", str(tmp_path / "both.mcap"), "--quiet", "--time-limit", "20"]
@@ -157,7 +157,7 @@ def test_play_and_convert_write_traces(tmp_path: Path, capsys) -> None:
 def test_a_missing_extra_is_named(tmp_path, network, motion, monkeypatch, capsys) -> None:
     monkeypatch.setitem(__import__("sys").modules, "osi_utilities", None)
     scenario = str(ROOT / "templates" / "cut-in.xosc")
-    assert main(["play", scenario, "--osi", str(tmp_path / "trace.mcap")]) == 1
+    assert main(["states", scenario, "--osi", str(tmp_path / "trace.mcap")]) == 1
     assert "pip install 'xosc-lateral[osi]'" in capsys.readouterr().err
     assert not (tmp_path / "trace.mcap").exists()
 

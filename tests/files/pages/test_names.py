@@ -30,6 +30,6 @@ def test_names_go_through_conversion_report_tables_and_viewer(tmp_path: Path, na
     scene = page.split('id="scene">')[1].split("</script>")[0]
     assert [entity["name"] for entity in json.loads(scene)["entities"]] == [*names]
     assert "<b>" not in page.split("<script")[0]
-    assert main(["play", str(tmp_path / "out.xosc"), "-o", str(tmp_path / "s.csv"), "--time-limit", "1", "-q"]) == 0
+    assert main(["states", str(tmp_path / "out.xosc"), "-o", str(tmp_path / "s.csv"), "--time-limit", "1", "-q"]) == 0
     table = (tmp_path / "s.csv").read_text(encoding="utf-8")
     assert all(name in table for name in names)

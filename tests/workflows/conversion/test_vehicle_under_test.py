@@ -267,12 +267,12 @@ def test_a_name_that_some_scenarios_of_a_folder_lack_applies_where_it_exists(
     other = re.sub(r'"C"', '"D"', (folder / "made.xosc").read_text())
     (folder / "other.xosc").write_text(other)
     words = ["convert", str(folder), "-o", str(tmp_path / "out"), "-q"]
-    assert main([*words, "--only", "C"]) == 0
+    assert main([*words, "--enrich", "C"]) == 0
     rows = {row.scenario: row for row in read_manifest(tmp_path / "out" / "manifest.parquet")}
     assert rows["made.xosc"].enriched == ("C",) and rows["other.xosc"].enriched == ()
     assert rows["made.xosc"].only == ("C",) and rows["made.xosc"].ego == ("Ego",)
     assert (rows["made.xosc"].mode, rows["other.xosc"].mode) == ("trajectory", "")
-    assert main([*words, "--only", "Nobody"]) == 1
+    assert main([*words, "--enrich", "Nobody"]) == 1
     assert "no scenario has such an entity" in capsys.readouterr().err
 
 
@@ -293,7 +293,7 @@ def test_a_vehicle_under_test_can_not_be_enriched_and_none_stands_alone(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["convert", str(scenario), "-o", str(tmp_path / "out.xosc")]
-    assert main([*words, "--only", "Ego"]) == 1
+    assert main([*words, "--enrich", "Ego"]) == 1
     assert "--ego none" in capsys.readouterr().err
     assert main([*words, "--ego", "none", "--ego", "A"]) == 2
 

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral import XoscLateralError, import_drives, reconstruct
+from xosc_lateral import XoscLateralError, import_drives, read_drives, reconstruct
 from xosc_lateral.drivers.drives.identity import clock_runs, frozen, identify, leaps
 from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad
 from xosc_lateral.workflows.detection.sources import SourceSettings, sources_of
 from xosc_lateral.workflows.recordings.recordings import read_recordings
+from xosc_lateral.workflows.result import given_drives
 
 STEP, COUNT = 0.1, 600
 
@@ -77,6 +78,84 @@ def _highd(traffic: pd.DataFrame, folder: Path) -> Path:
     about = {"frameRate": [10], "upperLaneMarkings": ["-9;-6"], "lowerLaneMarkings": ["0;3.5;7"]}
     pd.DataFrame(about).to_csv(folder / "01_recordingMeta.csv", index=False)
     return folder / "01_tracks.csv"
+
+
+def _fcd(traffic: pd.DataFrame, folder: Path) -> tuple[Path, Path]:
+    """SUMO's output on one edge of two lanes; x and y are the front bumper."""
+    net, fcd = folder / "run.net.xml", folder / "fcd.xml"
+    lane = '<lane id="e_{0}" index="{0}" speed="36" length="4000" width="3.5" shape="0,{1} 4000,{1}"/>'
+    net.write_text(f'<net><edge id="e">{lane.format(0, -5.25)}{lane.format(1, -1.75)}</edge></net>')
+    steps = []
+    traffic = traffic.assign(lane=(traffic["y"] > -3.5).astype(int))
+    traffic = traffic.assign(side=traffic["y"] + np.where(traffic["lane"] == 1, 1.75, 5.25))
+    for at, rows in traffic.groupby("time", sort=True):
+        cars = "".join(
+            f'<vehicle id="{row.id}" x="{row.x + 2.25:.6f}" y="{row.y:.6f}" angle="90" type="car" speed="30" '
+            f'pos="{row.x + 2.25:.6f}" lane="e_{row.lane}" posLat="{row.side:.6f}"/>'
+            for row in rows.itertuples()
+        )
+        steps.append(f'<timestep time="{at:.6f}">{cars}</timestep>')
+    fcd.write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
+    return fcd, net
+
+
+def _osi(traffic: pd.DataFrame, folder: Path) -> Path:
+    osi_utilities = pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
+    from osi3.osi_sensorview_pb2 import SensorView
+
+    path = folder / "made_gt.osi"
+    with osi_utilities.SingleTraceWriter() as writer:
+        writer.open(path)
+        for at, rows in traffic.groupby("time", sort=True):
+            message = SensorView().global_ground_truth
+            message.timestamp.seconds, message.timestamp.nanos = divmod(round(float(at) * 1e9), 1_000_000_000)
+            for row in rows.itertuples():
+                one = message.moving_object.add(type=2)
+                one.id.value, one.base.dimension.length = int(row.id), 4.5
+                one.base.position.x, one.base.position.y, one.base.position.z = row.x, row.y, 0.0
+                one.vehicle_classification.type = 4
+            writer.write_message(message)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["leaping", "standing", "plain"])
+@pytest.mark.parametrize("door", ["fcd", "osi"])
+def test_doors_of_simulators_see_the_same(door: str, kind: str, tmp_path: Path, road: Path) -> None:
+    traffic, truth = TRAFFIC[kind](), TRUTH[kind]
+    if door == "fcd":
+        source, net = _fcd(traffic, tmp_path)
+        imported, case = import_drives("fcd", source, net=net), {"road": net}
+    else:
+        source = _osi(traffic, tmp_path)
+        imported, case = import_drives("osi", source, road=road), {"road": road}
+    assert set(imported.table["drive"]) == truth
+    assert sum(imported.provenance.rows.values()) == len(traffic)
+    assert ("frozen" in imported.provenance.rows) == (kind == "standing")
+    tracks = tmp_path / "tracks.csv"
+    traffic.to_csv(tracks, index=False)
+    other = import_drives("tracks", tracks, road=road)
+    assert imported.provenance.rows.get("frozen") == other.provenance.rows.get("frozen")
+    made = reconstruct(source, **case).to_dict()
+    assert {row["recorded_as"] for row in made["vehicles"]} == truth
+    assert sum(made["rows"].values()) == len(traffic)
+
+
+def test_tables_of_drives_are_split_and_counted_at_every_door(tmp_path: Path) -> None:
+    time = np.arange(0.0, 60.0, 0.05)
+    rng = np.random.default_rng(2)
+    one = pd.DataFrame({"time": time, "offset": 0.3 * np.sin(time / 3.0) + rng.normal(0, 0.01, len(time))})
+    one = one.assign(lane_width=3.5, speed=30.0)
+    made = pd.concat([one, one.iloc[:50].assign(time=59.95), one.assign(offset=-one["offset"])], ignore_index=True)
+    made.loc[100:109, "offset"] = np.nan
+    made.to_csv(tmp_path / "day.csv", index=False)
+    imported = import_drives("table", tmp_path / "day.csv")
+    assert set(imported.table["drive"]) == {"day", "day#2"}
+    rows = {"kept": 2 * len(time) - 10, "repeated time": 50, "no place in a lane": 10}
+    assert imported.provenance.rows == rows
+    imported.write(tmp_path / "again.parquet")
+    drives = read_drives(tmp_path / "again.parquet")
+    assert [(drive.name, len(drive)) for drive in drives] == [("day", len(time) - 10), ("day#2", len(time))]
+    assert given_drives(tmp_path / "day.csv").left_out == {"repeated time": 50, "no place in a lane": 10}
 
 
 @pytest.mark.parametrize("kind", TRAFFIC)

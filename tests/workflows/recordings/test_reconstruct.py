@@ -377,7 +377,7 @@ def test_an_osi_trace_of_a_played_scenario_gives_it_back(tmp_path):
     pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
     scenario, road = xl.write_template("cut-in", tmp_path / "first")
     trace = tmp_path / "trace.osi"
-    assert main(["play", str(scenario), "--osi", str(trace), "-q"]) == 0
+    assert main(["states", str(scenario), "--osi", str(trace), "-q"]) == 0
     made = xl.reconstruct(trace, tmp_path / "again", road=road)
     assert [(row["entity"], row["kind"], row["side"]) for row in made.to_dict()["maneuvers"]] == [
         ("CutIn", "lane change", "right")
@@ -398,7 +398,7 @@ def test_an_osi_trace_brings_its_road_with_it(template, tmp_path):
     pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
     scenario, _ = xl.write_template(template, tmp_path / "first")
     trace = tmp_path / "trace.osi"
-    assert main(["play", str(scenario), "--osi", str(trace), "-q"]) == 0
+    assert main(["states", str(scenario), "--osi", str(trace), "-q"]) == 0
     made = xl.reconstruct(trace, tmp_path / "again")
     changes = [row["kind"] for row in made.to_dict()["maneuvers"]]
     assert changes == (["lane change"] if template == "cut-in" else [])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,6 +57,7 @@ def clean_drive(
     columns: dict[str, FloatArray],
     levels: frozenset[str],
     path: Path,
+    lost: Counter[str] | None = None,
 ) -> Drive | None:
     """Rows of one drive, from whatever source, sorted by time, without repeated times and rows without a place in the
     lane; None when nothing is left.
@@ -62,9 +65,10 @@ def clean_drive(
     `columns`, shape (n,): `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m];
     `speed` [m/s] if known; `RUN` where an import has cut the drive; all others are context, of which `levels` hold
     levels. NaN: missing, or "there is none". Raises `FormatError` if a column can't be in the unit meant, or the rows
-    are too far apart; `path` is what messages call the source.
+    are too far apart; `path` is what messages call the source. `lost` counts rows that are left out, by reason.
     """
-    columns = _in_order(columns, name, path)
+    lost = Counter[str]() if lost is None else lost
+    columns = _in_order(columns, name, path, lost)
     if RUN not in columns:
         _require_opposite(columns, name, path)
         place = np.isfinite(_position(columns)[0])
@@ -74,16 +78,21 @@ def clean_drive(
     narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
     good = np.isfinite(offset) & np.isfinite(lane_width) & ~narrow
     good[good] = np.abs(offset[good]) <= lane_width[good]
+    left = [("no place in a lane", int(good.sum()))]
     if RUN in columns:
         good &= columns[RUN] >= 0  # also NaN is none
+        left.append(("cut by the import", int(good.sum())))
     speed = columns.get("speed")
     if speed is not None and np.isfinite(speed).any():
         good &= np.isfinite(speed)
-    frozen = np.zeros(len(good), dtype=np.bool_)
+        left.append(("no speed", int(good.sum())))
     if RUN not in columns:
-        frozen[good] = frozen_rows(columns["time"][good], offset[good], lane_width[good])
-        good &= ~frozen
+        good[good] = ~frozen_rows(columns["time"][good], offset[good], lane_width[good])
+        left.append(("frozen", int(good.sum())))
+    for (reason, after), before in zip(left, (len(good), *(count for _, count in left)), strict=False):
+        lost[reason] += before - after
     if good.sum() < 2:
+        lost["a drive of one row"] += int(good.sum())
         return None
     every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
     empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
@@ -91,10 +100,12 @@ def clean_drive(
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
     drive = Drive(
         name, columns["time"][good], offset[good], lane_width[good],
-        context, frozenset(levels & context.keys()), str(path), run, empty=empty, frozen=int(frozen.sum()),
+        context, frozenset(levels & context.keys()), str(path), run, empty=empty,
         valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip
-    return drive if run is not None else _seen_through(drive)
+    seen = drive if run is not None else _seen_through(drive)
+    lost["no marking to trust"] += len(drive) - len(seen)
+    return seen
 
 
 TOGETHER, LEAST_MOVEMENT = 0.7, 0.02
@@ -172,9 +183,10 @@ def _seen_through(drive: Drive) -> Drive:
     )
 
 
-def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str, FloatArray]:
+def _in_order(columns: dict[str, FloatArray], name: str, path: Path, lost: Counter[str]) -> dict[str, FloatArray]:
     """Rows sorted by time, the first of each time kept."""
     known = np.flatnonzero(np.isfinite(columns["time"]))
+    lost["no time"] += len(columns["time"]) - len(known)
     order = known[np.argsort(columns["time"][known], kind="stable")]
     columns = {key: values[order] for key, values in columns.items()}
     time = columns["time"]
@@ -190,6 +202,7 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
         if duration > limit.value:
             refuse(f"{limit.refusal(duration)}; {clock}")
     repeated = np.concatenate([[False], np.diff(time) <= 0])
+    lost["repeated time"] += int(repeated.sum())
     offset, later = _position(columns)[0], np.flatnonzero(repeated)
     apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION_DISTANCE).sum())
     if apart > max(5, MAX_CONTRADICTIONS * len(time)):
@@ -269,9 +282,9 @@ def frozen_rows(time: FloatArray, offset: FloatArray, lane_width: FloatArray) ->
     return frozen
 
 
-def summary_of(drives: Sequence[Drive]) -> Mapping[str, float]:
+def summary_of(drives: Sequence[Drive], left_out: Mapping[str, int]) -> dict[str, Any]:
     """What shows exchanged sides and wrong units: mean and spread of the offset, lane width [m]; 5 and 95 % quantile of
-    the speed [m/s]; time driven [h]; drivers, and the share of rows that a frozen camera repeated, where there are any.
+    the speed [m/s]; time driven [h]; drivers, and rows left out by reason, where there are any.
     """
     offset = np.concatenate([drive.offset for drive in drives])
     speed = np.concatenate([drive.speed for drive in drives if drive.speed is not None] or [np.zeros(0)])
@@ -286,6 +299,5 @@ def summary_of(drives: Sequence[Drive]) -> Mapping[str, float]:
         figures |= {f"speed_{share}": float(np.quantile(speed, share / 100.0)) for share in (5, 95)}
     if drivers := {drive.driver for drive in drives if drive.driver}:
         figures["drivers"] = len(drivers)
-    if frozen := sum(drive.frozen for drive in drives):
-        figures["frozen"] = frozen / (frozen + len(offset))
-    return {name: round(value, 4) for name, value in figures.items()}
+    rounded: dict[str, Any] = {name: round(value, 4) for name, value in figures.items()}
+    return rounded | ({"left_out": dict(left_out)} if left_out else {})

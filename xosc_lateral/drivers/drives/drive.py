@@ -52,7 +52,6 @@ class Drive:
     valid_below: float | None = None  # Frequency below which the recording shows driving, where it is known. [Hz]
     resolution: float | None = None  # Step or noise of the offsets, where it is known. [m]
     driver: str = ""  # Who drove, where the table says; several drives may be one driver's.
-    frozen: int = 0  # Rows left out because a camera had repeated itself, see `frozen_rows`.
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""

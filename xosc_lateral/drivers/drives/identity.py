@@ -10,10 +10,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rows import true_slices
 
@@ -25,6 +27,7 @@ LEAP_DISTANCE = 1.5  # farther than it can have driven (half a narrow lane): the
 LEAP_SPEED = 10.0  # no vehicle is slower or faster by so much from one row to the next [m/s]
 FROZEN_TIME = 0.5  # a moving vehicle that is at one place for longer was not seen; shorter, it is bridged [s]
 FROZEN_SPEED = 3.0  # who moves as fast before or after can't have stood there within a row [m/s]
+HARDEST_BRAKING = 10.0  # dry asphalt allows no more: what speeds may differ by between rows that are far apart [m/s2]
 GLITCH_ROWS = 2  # so few rows between two leaps are an error of places, no vehicle
 NAMED = 20  # so many vehicles are named that leap
 REPEATED_DISTANCE, MOST_REPEATED = 2.0, 0.01  # one vehicle at two places at once [m], in so many of its rows [-]
@@ -75,7 +78,8 @@ def leaps(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:
     steps = np.hypot(*moved) / step
     usual, rows = median_filter(steps, 5, mode="nearest"), np.arange(len(steps))
     before, after = (usual[np.clip(rows + shift, 0, len(rows) - 1)] for shift in (-3, 2))  # of five before, five after
-    return np.asarray(broken | (~unseen & (np.abs(after - before) > LEAP_SPEED)))
+    possible = np.maximum(LEAP_SPEED, 5.0 * HARDEST_BRAKING * step)  # they are five rows apart
+    return np.asarray(broken | (~unseen & (np.abs(after - before) > possible)))
 
 
 def frozen(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:
@@ -85,7 +89,8 @@ def frozen(time: FloatArray, x: FloatArray, y: FloatArray) -> BoolArray:
     for part in true_slices(speed == 0.0):
         around = speed[max(part.start - 3, 0) : part.start], speed[part.stop + 1 : part.stop + 4]  # a leap is no speed
         if (
-            max((float(np.median(side)) for side in around if len(side)), default=0.0) > FROZEN_SPEED
+            max((float(np.median(side)) for side in around if len(side)), default=0.0)
+            > max(FROZEN_SPEED, 2.0 * HARDEST_BRAKING * step[part.start])  # the median's row is two before
             and time[part.stop] - time[part.start] > FROZEN_TIME
         ):
             rows[part.start + 1 : part.stop + 1] = True
@@ -107,12 +112,12 @@ class Identified:
 
 def identify(
     names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray,
-    recording: Sequence[str] | None = None,
+    recording: Sequence[str] | None = None, *, path: Path = Path("rows"),
 ) -> Identified:  # fmt: skip
     """Vehicles of rows in file order; `vehicle`: index into `names`, shape (n,) as all. [s], [m]
 
     `recording`: what the file says that each row is of. Vehicles of several recordings are called after them.
-    Raises `ValueError`: a vehicle is at two places at once.
+    Raises `FormatError`: a vehicle is at two places at once; `path`: what it calls the source.
     """
     labels = np.zeros(len(time), dtype=np.int64)
     stated: list[str] = []
@@ -130,10 +135,9 @@ def identify(
     places = np.hypot(x[rows[later]] - x[rows[later - 1]], y[rows[later]] - y[rows[later - 1]])
     if (apart := int((places > REPEATED_DISTANCE).sum())) > max(5, MOST_REPEATED * len(time)):
         name = names[int(vehicle[rows[later[int(places.argmax())]]])]
-        raise ValueError(
-            f"vehicle {name} is at two places at once, {places.max():.4g} m apart, as {apart} of {len(time)} rows "
-            "show: several recordings in one need a column that names them, recording=COLUMN"
-        )
+        what = f"vehicle {name} is at two places at once, {places.max():.4g} m apart, as {apart} of {len(time)} rows"
+        advice = "several recordings in one need a column that names them, recording=COLUMN"
+        raise FormatError(f"{what} show: {advice}", path=path)
     rows = rows[~repeated]
     new = np.r_[True, (np.diff(code[rows]) != 0) | (np.diff(vehicle[rows]) != 0)] if len(rows) else np.zeros(0, bool)
     bounds = np.r_[np.flatnonzero(new), len(rows)]

@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
+from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement
@@ -106,7 +107,7 @@ def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> Logi
     reference = owner.required("ScenarioFile")
     boundary = references.Boundary(path.parent, references.allowed_roots(path, allowed))
     scenario = boundary.inside(reference.text("filepath"), reference.place())
-    if not scenario.is_file():
+    if not is_file(scenario):
         reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
     content = owner.required("Deterministic", "Stochastic")
     context = Context(header.version, references.Catalogs({}, boundary, []), [], {})

@@ -10,6 +10,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
 from xosc_lateral.files.openscenario.element import XmlElement, local_name, means_true
@@ -86,7 +87,7 @@ class RoadSearch(Struct, frozen=True):
         for folder in self.folders:
             if not folder.is_dir():
                 raise FormatError("no such folder to look for roads in", path=folder)
-        if self.file is not None and not self.file.is_file():
+        if self.file is not None and not is_file(self.file):
             raise FormatError("no such road", path=self.file)
 
 
@@ -200,7 +201,7 @@ def _road_file(
     place, name = logic.place(), PureWindowsPath(written.strip()).name
     try:
         road = boundary.inside(written, place)
-        if road.is_file():
+        if is_file(road):
             return road
         missing = place.error(f"road file '{written}' does not exist (looked for {road})")
     except FormatError as error:
@@ -213,7 +214,7 @@ def _road_file(
     folder = boundary.folder
     beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
     for near in (*beside, *roads.folders):
-        if name and (near / name).is_file():
+        if name and is_file(near / name):
             remarks.append(Unsupported("LogicFile", place, f"'{written}' is taken from {near / name}"))
             return near / name
     raise missing

@@ -18,6 +18,7 @@ from glob import escape
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
+from xosc_lateral.files.held import exists, glob, is_file
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.xml import read_document, read_xml
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
@@ -44,7 +45,7 @@ def allowed_roots(scenario: Path, extra: Iterable[Path] = ()) -> tuple[Path, ...
 def require_folders(folders: Iterable[Path]) -> None:
     """Refuse what is no folder: a typing error would otherwise allow nothing without a word."""
     for folder in folders:
-        if not Path(folder).is_dir():
+        if not exists(Path(folder)) or is_file(Path(folder)):
             raise FormatError("no such folder to allow", path=folder)
 
 
@@ -137,21 +138,21 @@ class Catalogs:
                 folder, candidate = path.parent, path if path.stem == catalog else None
             else:
                 folder, candidate = path, path / f"{catalog}.xosc"
-            if candidate is not None and candidate.is_file() and self.boundary.holds(candidate):
+            if candidate is not None and is_file(candidate) and self.boundary.holds(candidate):
                 return candidate
             if self.boundary.holds(folder) or not os.access(folder, os.F_OK):
                 folders.append(folder)
             else:
                 refused = refused or self.boundary.refusal(written, place)
         for folder in dict.fromkeys(folders):  # a file whose catalog bears that name, whatever its own is
-            for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
+            for path in sorted(glob(folder, "*.xosc"))[:MAX_FILES_SCANNED]:
                 with suppress(FormatError):
                     inside = read_xml(path)[0].iterfind("{*}Catalog") if self.boundary.holds(path) else ()
                     if any(xml.get("name") == catalog for xml in inside):
                         return path
         # Some field files name stale folders: then the only file of that name at most three levels below the scenario.
         patterns = (f"{levels}{escape(catalog)}.xosc" for levels in ("", "*/", "*/*/", "*/*/*/"))
-        near = [path for pattern in patterns for path in self.boundary.folder.glob(pattern) if path.is_file()]
+        near = [path for pattern in patterns for path in glob(self.boundary.folder, pattern) if is_file(path)]
         if len(near) == 1 and self.boundary.holds(near[0]):
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near[0]}"))
             return near[0]

@@ -6,8 +6,8 @@ import errno
 import os
 import time
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -18,18 +18,19 @@ from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
+from xosc_lateral.files.output_paths import label_files
 from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
-from xosc_lateral.workflows.batch.journal import Journal, folder_lock
+from xosc_lateral.workflows.batch.journal import STATE_FOLDER, Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, Timing, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
 
-STATE_FOLDER = ".xosc-lateral"
-"""Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
+MERGE_TIME = 600.0
+"""So long a part waits for others that are writing the manifest: each takes a second for ten thousand rows. [s]"""
 
 _STOPPING = frozenset(
     {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ESTALE, errno.ENOTCONN}
@@ -107,7 +108,7 @@ def convert_many(
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_GOES_ON}") from error
     finally:
-        _remove_empty([batch.folder / STATE_FOLDER, *new])
+        remove_empty([batch.folder / STATE_FOLDER, *new])
 
 
 def _outcomes(
@@ -118,11 +119,20 @@ def _outcomes(
     keep_old: bool,
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
-    state = batch.folder / STATE_FOLDER
-    with folder_lock(state / "lock") as runs, ExitStack() as stack:
+    state = batch.folder / STATE_FOLDER / batch.shard
+    planned = {job.name for job in batch.jobs}
+    with ExitStack() as stack:
+        stack.callback(remove_empty, [state])
+        runs = stack.enter_context(folder_lock(state / "lock"))
         stack.callback(_sweep, batch.folder, runs[:1])
         _sweep(batch.folder, runs[1:])
-        journal = stack.enter_context(Journal(batch.folder, state / "journal.jsonl", notify))
+        if batch.shard:
+            with whole_folder(batch.folder):
+                pass  # nobody is at work on the whole
+        only = planned if batch.shard else None
+        journal = stack.enter_context(Journal(batch.folder, state / "journal.jsonl", notify, only))
+        if not batch.shard:
+            _take_over_parts(batch.folder, journal, notify)
         todo: dict[str, tuple[Job, str]] = {}
         failed: set[Path] = set()
         for job in batch.jobs:
@@ -141,15 +151,46 @@ def _outcomes(
                     outcome = _noted(job, reply, journal, todo[job.name][1])
                     failed |= {job.output.parent} if outcome.row.error else set()
                     yield outcome
-        planned = {job.name for job in batch.jobs}
-        for output in journal:  # rows of former runs stay as long as their output does
-            if output not in planned and not (batch.folder / output).is_file():
-                journal.forget(output)
-        with files_of_run(runs[0]):
-            journal.finish()
-        _remove_empty(
-            place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
-        )
+        if batch.shard:
+            with whole_folder(batch.folder) as run:
+                whole = Journal(batch.folder, batch.folder / STATE_FOLDER / "journal.jsonl", notify)
+                whole.take_over(journal)
+                _finish(whole, batch, planned | batch.elsewhere, run)
+            journal.drop()
+        else:
+            _finish(journal, batch, planned, runs[0])
+        remove_empty(place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents)
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[str]:
+    """Hold the folder for a moment, other parts of a batch being at work in it; gives the id of this run.
+
+    Raises `FolderInUseError`: somebody is at work on the whole.
+    """
+    with folder_lock(folder / STATE_FOLDER / "lock", wait=MERGE_TIME) as runs:
+        _sweep(folder, runs[1:])
+        yield runs[0]
+
+
+def _take_over_parts(folder: Path, journal: Journal, notify: Callable[[str], None]) -> None:
+    """Go on where parts were killed; `FolderInUseError`: one is at work."""
+    for part in sorted((folder / STATE_FOLDER).glob("*-of-*")):
+        with folder_lock(part / "lock") as runs:
+            _sweep(folder, runs[1:])
+            of_part = Journal(folder, part / "journal.jsonl", notify, only=())
+            journal.take_over(of_part)
+            of_part.drop()
+        remove_empty([part])
+
+
+def _finish(journal: Journal, batch: Batch, planned: Container[str], run: str) -> None:
+    """Write the manifest; rows of former runs stay as long as their output does."""
+    for output in journal:
+        if output not in planned and not (batch.folder / output).is_file():
+            journal.forget(output)
+    with files_of_run(run):
+        journal.finish()
 
 
 def _up_to_date(batch: Batch) -> Iterator[JobOutcome]:
@@ -161,7 +202,7 @@ def _up_to_date(batch: Batch) -> Iterator[JobOutcome]:
             yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
 
 
-def _remove_empty(folders: Iterable[Path]) -> None:
+def remove_empty(folders: Iterable[Path]) -> None:
     """Those with nothing in them, inner ones first; a run that has just begun may have its lock there."""
     for folder in folders:
         with suppress(OSError):
@@ -223,6 +264,8 @@ def _why_anew(job: Job, row: ManifestRow | None, state: str) -> str:
         return "changed or gone"
     if job.page is not None and not job.page.is_file():
         return "its page is gone"
+    if job.labels and not all(path.is_file() for path in label_files(job.output)):
+        return "its labels are gone"
     if row.behaviour != BEHAVIOUR:
         return PROGRAM
     if row.settings != job.fingerprint or row.scenario != job.scenario:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Unpack
@@ -15,15 +16,17 @@ from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.names import in_terminal
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
-from xosc_lateral.workflows.batch.batch import JobOutcome, JobState
+from xosc_lateral.workflows.batch.batch import JobOutcome, JobState, remove_empty, whole_folder
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
 from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
+from xosc_lateral.workflows.batch.journal import STATE_FOLDER
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
+from xosc_lateral.workflows.inputs import is_url
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
@@ -51,6 +54,11 @@ def convert_many(
         rich_help_panel=BATCH)] = JOB_MEMORY.value,
     cluster: Annotated[str | None, flag(metavar="ADDRESS", help="Address of a dask scheduler.",
         rich_help_panel=BATCH)] = None,
+    shard: Annotated[str | None, flag("--shard", metavar="K/N",
+        help="Part K of N, for a scheduler: all parts together leave what one run leaves.",
+        rich_help_panel=BATCH)] = None,
+    labels: Annotated[bool, flag("--labels",
+        help="Beside each output OpenLABEL tags and an ASAM quality result (.xqar).")] = False,
     keep_old: Annotated[bool, flag("--keep-old", help="Leave outputs of older inputs or versions alone.",
         rich_help_panel=BATCH)] = False,
     force: bool = False,
@@ -71,6 +79,9 @@ def convert_many(
         Folder for a page per output, and an ``index.html`` that lists what needs attention first.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
+    shard : str
+        "2/8": the second of eight parts, which may run at the same time, on other machines with the same folder; a part
+        that was killed is run again, or the whole without `shard`.
     keep_old : bool
         Leave outputs as they are whose inputs, settings or program have changed since; they count as stale.
     force : bool
@@ -94,10 +105,15 @@ def convert_many(
         inputs = list(scenarios)
     else:
         inputs = list(read_request_table(scenarios, settings, variants=variants))
-    batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
-    if not len(batch):
-        raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
-    _refuse_unknown_names(batch)
+    for place in (*inputs, output):
+        if is_url(place):
+            raise FormatError("a batch needs a folder: mount the bucket; one scenario goes without", path=place)
+    number, parts = (1, 1) if shard is None else read_shard(shard)
+    whole = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report, labels=labels)
+    if not len(whole):
+        raise FormatError(f"no scenario to convert{_left_out(whole)}", path=", ".join(map(str, inputs[:3])) or output)
+    batch = whole if shard is None else whole.part(number, parts)
+    _refuse_unknown_names(whole)
     # A folder in an output's place is that output's failure alone.
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
     outcomes = outcomes_of(
@@ -120,8 +136,20 @@ def convert_many(
     except Interrupted as signal:
         signal.finished = sum(job.output.is_file() for job in batch.jobs)
         raise
-    index = None if report is None else write_batch_index(batch, Path(report))
+    index = None
+    if report is not None:  # whichever part ends last has all of them
+        with nullcontext() if shard is None else whole_folder(batch.folder):
+            index = write_batch_index(whole, Path(report))
+        remove_empty([batch.folder / STATE_FOLDER])
     return BatchResult(batch, summary, index)
+
+
+def read_shard(text: str) -> tuple[int, int]:
+    """Which part of how many; `ValueError`: neither."""
+    number, parts = (int(word) if word.isdecimal() else 0 for word in (text.partition("/")[::2]))
+    if not 1 <= number <= parts:
+        raise ValueError(f"shard {text!r}: expected K/N, the parts counted from 1 to N")
+    return number, parts
 
 
 def _refuse_unknown_names(batch: Batch) -> None:

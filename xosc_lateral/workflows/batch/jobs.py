@@ -43,6 +43,7 @@ class Job:
     fingerprint: str  # SHA-256 over all but the input files and the program that decides on the output's bytes
     error: str = ""  # why it can't even be tried (a distribution that can't be read)
     page: Path | None = None  # where a report page about it is written, and its thumbnail beside that
+    labels: bool = False  # tags and quality result are written beside the output
     package_version: str = __version__  # of the process that planned it: a worker with another one refuses
 
     def row(self, error: str = "") -> ManifestRow:
@@ -75,9 +76,17 @@ class Batch:
     jobs: tuple[Job, ...]  # by name
     left_out: tuple[tuple[Path, DocumentKind], ...] = ()  # found, but catalogs, or outputs of former conversions
     notes: tuple[str, ...] = ()  # what a user has to know before it begins, a line each
+    shard: str = ""  # which part of the whole: "2-of-8"
+    elsewhere: frozenset[str] = frozenset()  # names of the jobs of other parts
 
     def __len__(self) -> int:
         return len(self.jobs)
+
+    def part(self, number: int, count: int) -> Batch:
+        """One of `count` parts, from 1. Neighbours by name stay together: variants of a scenario are played once."""
+        begin, end = (len(self) * edge // count for edge in (number - 1, number))
+        others = frozenset(job.name for job in (*self.jobs[:begin], *self.jobs[end:]))
+        return replace(self, jobs=self.jobs[begin:end], shard=f"{number}-of-{count}", elsewhere=others)
 
 
 def plan_batch(
@@ -87,6 +96,7 @@ def plan_batch(
     *,
     variants: int = 1,
     report: str | Path | None = None,
+    labels: bool = False,
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
@@ -95,7 +105,7 @@ def plan_batch(
       becomes ``folder/a/x.xosc``, of its `variants` the first ``x_01.xosc``, the first scenario of a parameter value
       distribution ``x_p00000.xosc``, a row of a table with settings of its own ``x_PROFILE_HASH.xosc``: its profile,
       and a hash of what else it says
-    - `report`: folder for a report page per output, in a tree like that of the outputs
+    - `report`: folder for a report page per output, in a tree like that of the outputs; `labels`: see `Job`
 
     Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
     of an input; `DriverProfileError`: a profile that is unknown.
@@ -139,7 +149,7 @@ def plan_batch(
     for job in jobs.values():
         if real_path(job.output, folders) in sources:
             raise FormatError("is an input: choose another output folder", path=job.output)
-    planned = [jobs[name] for name in sorted(jobs)]
+    planned = [replace(jobs[name], labels=labels) for name in sorted(jobs)]
     if report is not None:
         pages = _normal(Path(report))
         planned = [replace(job, page=(pages / job.name).with_suffix(".html")) for job in planned]
@@ -220,8 +230,8 @@ class Fingerprints:
         values = settings.record(Path()) | {"strict": settings.strict}
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
-        for name, path in (("context", settings.context), ("road", settings.road)):
-            values[name] = None if path is None else _hash_or(path, MISSING_HASH)
+        stated = {name: getattr(settings, name) for name in values}
+        values |= {name: _hash_or(path, MISSING_HASH) for name, path in stated.items() if isinstance(path, Path)}
         return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
@@ -259,6 +269,8 @@ def convert_job(job: Job) -> ManifestRow:
     with together():
         conversion = convert_scenario(job.source, job.output, job.settings, variant_index=job.variant)
         _refuse_changes(job)
+        if job.labels:
+            conversion.write_labels(job.output, force=True)
         if job.page is not None:
             from xosc_lateral.workflows.conversion.page import conversion_page
             from xosc_lateral.workflows.playing.figures import thumbnail

@@ -9,7 +9,7 @@ import secrets
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, Self
@@ -24,17 +24,22 @@ class FolderInUseError(XoscLateralError):
     """Another run writes into the folder."""
 
 
+STATE_FOLDER = ".xosc-lateral"
+"""Folder inside the output folder, there only while a batch is unfinished: journal and lock; of a part in a folder of
+its own."""
+
+
 @contextmanager
-def folder_lock(path: Path) -> Iterator[Sequence[str]]:
+def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
     """Hold a lock file while the block runs; gives ids: that of this run, then those of killed runs before it.
 
     The operating system's lock counts, which goes with the process; what the file says (process and host) is for the
     message, and the ids for what killed runs have left half-written.
 
-    Raises `FolderInUseError`: when another process holds it; `FormatError`: it is a link or somebody else's; `OSError`:
-    when the folder can't be written.
+    Raises `FolderInUseError`: when another process holds it for longer than `wait` [s]; `FormatError`: it is a link or
+    somebody else's; `OSError`: when the folder can't be written.
     """
-    file = _open_locked(path)
+    file = _open_locked(path, wait)
     try:
         killed = stated if isinstance(stated := _stated(file).get("runs"), list) else []
         killed = [run for run in map(str, killed) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
@@ -64,7 +69,8 @@ def _stated(file: IO[bytes]) -> dict[str, Any]:
     return values if isinstance(values, dict) else {}
 
 
-def _open_locked(path: Path) -> IO[bytes]:
+def _open_locked(path: Path, wait: float) -> IO[bytes]:
+    end = time.monotonic() + wait
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -74,10 +80,14 @@ def _open_locked(path: Path) -> IO[bytes]:
         if not _lock(file):
             values = _stated(file)
             file.close()
+            if time.monotonic() < end:
+                time.sleep(0.05)
+                continue
             is_stated = {"pid", "host"} <= values.keys()
             holder = f"process {values['pid']} on {values['host']}" if is_stated else "starting right now"
+            folder = path.parents[1 if path.parent.name == STATE_FOLDER else 2]
             raise FolderInUseError(
-                f"{path.parent.parent}: another run ({holder}) is writing into this folder; wait for it, or use another"
+                f"{folder}: another run ({holder}) is writing into this folder; wait for it, or use another"
             )
         try:
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
@@ -122,11 +132,14 @@ class Journal:
     begins, so that ten thousand of them cost a megabyte.
 
     `folder`: output folder; rows of its manifest count until the journal has newer ones; `path`: the journal; `notify`:
-    gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
+    gets a line if manifest or timings can't be read: they are put aside, and the run goes on without; `only`: outputs
+    of the manifest that matter.
     """
 
-    def __init__(self, folder: Path, path: Path, notify: Callable[[str], None]) -> None:
-        self._folder, self._path, self._notify = folder, path, notify
+    def __init__(
+        self, folder: Path, path: Path, notify: Callable[[str], None], only: Container[str] | None = None
+    ) -> None:
+        self._folder, self._path, self._notify, self._only = folder, path, notify, only
         self._begin: dict[str, int] = {}
         self._timings: dict[str, Timing] = {}
         self._file = open_own(path)
@@ -182,8 +195,19 @@ class Journal:
             timings = ((output, _known(self._timings[output], now)) for output in outputs)
             manifest.write_timings(timings, self._folder / TIMINGS)
             manifest.write_manifest(filter(None, map(self.row, outputs)), self._folder / MANIFEST)
+        self.drop()
+
+    def drop(self) -> None:
+        """Leave nothing behind: what it says is in the manifest."""
         self._file.close()
         self._path.unlink()
+
+    def take_over(self, other: Journal) -> None:
+        """Take the rows of another journal, as they are there."""
+        for output in other:
+            row, timing = other.row(output), other.timing(output)
+            if row is not None and (row, timing) != (self.row(output), self.timing(output)):
+                self.add(row, timing)
 
     def _intact_end(self) -> int:
         """Index the lines there are; returns where the last whole one ends. [byte]"""
@@ -207,7 +231,7 @@ class Journal:
             timings = manifest.read_timings(timings_path)
         with self._put_aside_if_damaged(MANIFEST):
             for row in manifest.read_manifest(path):
-                if row.output not in self._begin:
+                if row.output not in self._begin and (self._only is None or row.output in self._only):
                     self.add(row, timings.get(row.output, Timing()))
         self._changed = recovered or not (timings_path.exists() and path.exists() and manifest.is_of_now(path))
 

@@ -12,7 +12,7 @@ from msgspec import structs
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.files.atomic import together
-from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.output_paths import claim, label_files, output_file
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 from xosc_lateral.world.motion.nominal import Activity
@@ -189,6 +189,16 @@ class Conversion(ConvertedScenario, Result):
             for file, text in summary_of(self, output).items():
                 write_atomically(file, text)
         return output
+
+    def write_labels(self, beside: PathLike, *, force: bool = False) -> tuple[Path, Path]:
+        """Write OpenLABEL tags and an ASAM quality result beside an output: ``NAME.openlabel.json``, ``NAME.xqar``."""
+        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.workflows.conversion.labels import openlabel, quality_result
+
+        tags, quality = label_files(Path(beside))
+        claim([tags, quality], [self.source], force=force)
+        with together():
+            return write_atomically(tags, openlabel(self)), write_atomically(quality, quality_result(self))
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page about what was changed."""

@@ -17,6 +17,7 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
+from xosc_lateral.files.held import exists, held_at
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import guard_input, guarding_inputs
@@ -31,6 +32,7 @@ from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertS
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.user_player import told_by_player
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
+from xosc_lateral.workflows.inputs import DocumentLike, is_url, open_url, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion
@@ -42,7 +44,7 @@ SCENARIO_SUFFIXES = (".xosc",)
 
 @spelled_out(ConvertSettings)
 def convert(
-    scenario: PathLike,
+    scenario: DocumentLike,
     output: PathLike | None = None,
     *,
     variant: int = 1,
@@ -54,11 +56,15 @@ def convert(
 
     Parameters
     ----------
-    scenario : str or Path
-        Maneuver-based OpenSCENARIO file.
+    scenario : str, Path, bytes, file-like, lxml tree or scenariogeneration's `Scenario`
+        Maneuver-based OpenSCENARIO file, or what one holds; a text that begins with ``<`` is one.
+    road : the same, or a mapping
+        OpenDRIVE file, whatever the scenario says; roads and catalogs by their names, as the scenario writes them or
+        without folders. What is in memory, or has such a mapping, reads nothing else from a disk.
     output : str or Path, optional
-        File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
-        references as seen from the scenario's folder.
+        File, or folder, to write to, or a URL (``s3://...``, through fsspec). Without it nothing is written;
+        `Conversion.data` holds what would be, with file references as seen from the scenario's folder. Those of a
+        scenario in memory stay as they are written.
     variant : int
         From 1; each has other offsets.
     report : str or Path, optional
@@ -75,16 +81,27 @@ def convert(
     """
     if variant < 1:
         raise ValueError(f"variant {variant}, they count from 1")
-    settings = ConvertSettings.of(**options)
-    source = Path(scenario)
+    inputs = scenario_input(scenario, options.pop("road", None))
+    settings = ConvertSettings.of(**options, road=inputs.road)
+    source, url = inputs.path, output if isinstance(output, str) and is_url(output) else ""
+    output = None if url else output
     # without an output, file references in the bytes are as from the source's folder
     target = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
     claim([None if output is None else target, page], [source], force=force)
     with together():
         conversion = convert_scenario(
-            source, target, settings, variant_index=variant - 1, report=page, saves=output is not None
+            source,
+            target,
+            settings,
+            variant_index=variant - 1,
+            report=page,
+            saves=output is not None,
         )
+        conversion.held = inputs.held
+        if url:
+            with open_url(url, "wb") as file:
+                file.write(conversion.data)
         if page is not None:
             conversion.write_report(page, force=force)
     return conversion
@@ -184,8 +201,9 @@ def check(plan: Plan, written: Written) -> Written:
         trial = written
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
-        # Parsed as if it lay at its place already.
-        output = read_scenario(plan.output, allowed=allowed, roads=settings.roads, data=trial.file.data)
+        # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
+        place = plan.source if held_at(plan.source) else plan.output
+        output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = source_meaning.compare(
             output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
         )
@@ -237,12 +255,13 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         trial_contacts=written.trial_contacts,
         controllers=plan.controllers,
         egos=plan.egos,
+        road_file=plan.played.scenario.road_file,
     )
 
 
 def output_scenario(output: PathLike, source: Path) -> Path:
     """A file: as it is. A folder: the source's name in it, or `default_output`'s where that is the source itself."""
-    if not source.exists():
+    if not exists(source):
         raise FormatError("no such file or folder", path=source)
     path = output_file(output, source.name, SCENARIO_SUFFIXES)
     is_source = path.parent.resolve() == source.parent.resolve() and path.name == source.name

@@ -188,7 +188,7 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
     egos = vehicles_under_test(scenario)
     if named:  # who names them means these: a name of the file says nothing then, a mark does
         egos = {name: why for name, why in egos.items() if why != BY_NAME} | named
-    for option, wanted in (("--entity", settings.entity), ("--only", settings.only or ())):
+    for option, wanted in (("--entity", settings.entity), ("--enrich", settings.only or ())):
         for name in wanted:
             if name in egos:
                 raise FormatError(
@@ -299,7 +299,7 @@ def choose_drivers(
     Raises `FormatError`: the settings name an entity that there is not; `DriverProfileError`: a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
-    asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
+    asked = (("--entity", settings.entity), ("--enrich", settings.only or ()), ("--ego", settings.ego or ()))
     for option, names in () if settings.names_may_lack else asked:
         for name in sorted(names):
             if name not in known:
@@ -318,7 +318,7 @@ def _driver(entity: Entity, settings: ConvertSettings, read: Callable[[str], Dri
     if not entity.is_vehicle:
         return f"a {entity.category.value}, no vehicle"
     if settings.only is not None and entity.name not in settings.only:
-        return "not chosen (--only)"
+        return "not chosen (--enrich)"
     named = settings.entity.get(entity.name, settings.profile)
     if named == AUTO:
         category = entity.vehicle_category or VehicleCategory.CAR

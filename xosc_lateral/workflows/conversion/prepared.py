@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from xosc_lateral.files.held import is_file
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun
 from xosc_lateral.workflows.conversion.load import Played, load_scenario, play_loaded, road_network
@@ -64,7 +65,7 @@ class Prepared:
             return False
         guard_input(source)
         road = scenario.road_file
-        return road is None or (road.is_file() and road_network(road) is self.loaded.network)
+        return road is None or (is_file(road) and road_network(road) is self.loaded.network)
 
     def _latest_made(self, name: str, key: Hashable, make: Callable[[], Latest]) -> Latest:
         """The latest of a kind: variants with the same settings come one after another."""

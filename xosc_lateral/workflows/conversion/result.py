@@ -6,21 +6,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
+from xosc_lateral.files.source import read_source
 from xosc_lateral.world.motion.gaps import Gap
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import Control
+
+if TYPE_CHECKING:
+    from scenariogeneration import xosc
+
+    from xosc_lateral.files.held import Held
 
 
 class Neighbours(StrEnum):
@@ -262,11 +269,33 @@ class ConvertedScenario:
     controllers: Mapping[str, Control] = field(default_factory=dict)  # of entities that are left to them
     egos: Mapping[str, str] = field(default_factory=dict)  # vehicles under test, and why each is one
     report: Path | None = None  # page that was written, if one was
+    road_file: Path | None = None
+    held: Held | None = None  # what was read from memory
 
     @property
     def data(self) -> bytes:
         """The converted scenario's bytes."""
         return self.content if self.output is None else self.output.read_bytes()
+
+    @property
+    def road(self) -> bytes | None:
+        """Bytes of its road; None: it has none."""
+        return None if self.road_file is None else read_source(self.road_file).data
+
+    def to_scenariogeneration(self) -> xosc.Scenario:
+        """The converted scenario as an object of scenariogeneration; `FormatError`: its parser can't read that."""
+        from xml.etree import ElementTree
+
+        from scenariogeneration import xosc
+
+        try:
+            tree = ElementTree.fromstring(self.data)
+            for dynamics in tree.iter("LaneOffsetActionDynamics"):
+                dynamics.attrib.setdefault("maxLateralAcc", "1e10")  # without it there is no limit; it wants one
+            return xosc.Scenario.parse(tree)
+        except Exception as error:  # whatever it did not expect
+            what = f"scenariogeneration's parser can't read it: {error or type(error).__name__}; `data` is complete"
+            raise FormatError(what, path=self.output or self.source) from error
 
     @property
     def entities(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.openscenario.write.draft import Player, TargetPlayer, target
 from xosc_lateral.workflows import options as say
 from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours
+from xosc_lateral.workflows.inputs import RoadLike
 from xosc_lateral.workflows.options import STEP, Option, PathLike, Paths, ProfileLike, option
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ class ConvertSettings:
         help="Profile of one entity; may be repeated.",
     )
     only: frozenset[str] | None = option(
-        None, say.names, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        None, say.names, "--enrich", kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
         help="Enrich only this entity; may be repeated.",
     )
     ego: frozenset[str] | None = option(
@@ -124,29 +125,29 @@ class ConvertSettings:
     parameters: Mapping[str, str] = option(
         {}, say.texts, "--set", cell=say.json_object, prefix="parameter:", entry=say.as_it_is
     )
-    library: tuple[Path, ...] = option((), say.paths)
+    library: tuple[Path, ...] = option((), say.paths, decides=False)
     mode: OutputMode = option(
         OutputMode.AUTO, say.one_of(OutputMode), kind=OutputMode, cell=say.as_it_is,
         help="trajectory: play the maneuvers out; lane-offset: keep them reactive; auto: by vehicle, as it depends on "
         "a vehicle under test.",
     )
     player: Player = option(
-        Player.STANDARD, say.one_of(Player), "--for", kind=Player, cell=say.as_it_is,
+        Player.STANDARD, say.one_of(Player), "--player", kind=Player, cell=say.as_it_is,
         help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
     )
     player_library: Path | None = option(
-        None, Path, "--player-library", kind=Path | None, show_default=False,
+        None, Path, "--player-library", kind=Path | None, decides=False, show_default=False,
         help="libesminiLib.so or esminiLib.dll of esmini 3: the check of a reactive output runs in it, too.",
     )
     version: str | None = option(
         None, str, kind=str | None, metavar="1.0..1.4", cell=say.as_it_is, show_default=False,
         help="Version of OpenSCENARIO to write; default: the input's.",
     )
-    allow: tuple[Path, ...] = option((), say.paths)
+    allow: tuple[Path, ...] = option((), say.paths, decides=False)
     road: Path | None = option(None, Path, cell=say.beside)
-    road_path: tuple[Path, ...] = option((), say.paths)
+    road_path: tuple[Path, ...] = option((), say.paths, decides=False)
     attempts: int = option(
-        1, say.whole_number(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        1, say.whole_number(1), "--attempts", kind=int, cell=say.as_it_is, min=1,
         help="Attempts at most, while vehicles collide or leave their lane.",
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
@@ -156,7 +157,7 @@ class ConvertSettings:
         help="Below 40 km/h on motorways the leftmost lane keeps left, others right. Assumed: nobody measured how far.",
     )
     strict: bool = option(
-        False, bool, "--strict", kind=bool,
+        False, bool, "--strict", kind=bool, decides=False,
         help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched.",
     )
     # fmt: on
@@ -192,7 +193,7 @@ class ConvertSettings:
 
         Where files are looked for is no part of it, for their hashes are known; nor what refuses more or less.
         """
-        names = [name for name in (*OPTIONS, "step") if name not in NOT_RECORDED]
+        names = [*(name for name, declared in OPTIONS.items() if declared.decides), "step"]
         return {name: _plain(name, getattr(self, name), folder) for name in names}
 
     @classmethod
@@ -249,16 +250,13 @@ class ConvertKeywords(TypedDict, total=False):
     player_library: PathLike | None
     version: str | None
     allow: Paths
-    road: PathLike | None
+    road: RoadLike | None
     road_path: Paths
     attempts: int
     time_limit: float | None
     with_sensor: bool
     jam_corridor: bool
     strict: bool
-
-
-NOT_RECORDED = frozenset({"library", "allow", "player_library", "road_path", "strict"})
 
 
 def _plain(name: str, value: Any, folder: Path) -> Any:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 from xosc_lateral.base.version import BEHAVIOUR, __version__
+from xosc_lateral.files.held import held_at
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
@@ -40,11 +41,12 @@ class Written:
 def write(plan: Plan, sampled: Enriched) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
+    place = plan.source.parent if held_at(plan.source) else plan.output.parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
-        scenario=f"{relative(folder, plan.output.parent)}/{plan.source.name}",
+        scenario=f"{relative(folder, place)}/{plan.source.name}",
         inputs={relative(path, folder): sha256 for path, sha256 in plan.inputs.items()},
         profiles={
             name: (one.name, profile_hash(one))

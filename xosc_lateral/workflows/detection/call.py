@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input, several
 from xosc_lateral.workflows.options import PathLike, Paths, declare_options, flag
 from xosc_lateral.workflows.options import paths as as_paths
 
@@ -34,7 +36,7 @@ def _known_sensor(text: str) -> str:
 
 @declare_options
 def detect(
-    sources: Paths, *,
+    sources: DocumentLike | Sequence[DocumentLike], *,
     detectors: Annotated[str | Sequence[str], flag("--detector", kind=list[str] | None,
         metavar='NAME[:OPTION=VALUE,...]|"COMMAND"',
         help="lateral-speed (threshold, hold), marking-distance, wandering-zone, time-to-line, fuzzy, logistic "
@@ -62,7 +64,7 @@ def detect(
     sight: Annotated[bool, flag(
         help="Range of vision instead: how often a vehicle sees the car before the car ahead.")] = False,
     seed: int = 0,
-    road: Annotated[PathLike | None, flag("--road", kind=Path | None, show_default=False,
+    road: Annotated[RoadLike | None, flag("--road", kind=Path | None, show_default=False,
         help="OpenDRIVE file of a recording without one.")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
@@ -74,7 +76,7 @@ def detect(
 
     Parameters
     ----------
-    sources : path or paths
+    sources : path or paths, or scenarios in memory (see `convert`)
         Scenarios (``.xosc``) and folders of them, nominal or converted; drive tables; recordings and tables of states.
     ego : str, optional
         Alarms are for cut-ins into its lane; "none": into any neighbouring lane. Without: a scenario's vehicle under
@@ -108,7 +110,11 @@ def detect(
     from xosc_lateral.workflows.detection.tracks import moves_in_lane
     from xosc_lateral.workflows.detection.tuning import in_order, read_goal, set_at_home
 
-    paths, homes, trainers = as_paths(sources), as_paths(home), as_paths(train)
+    inputs = [
+        scenario_input(one, road, f"scenario_{number}" if number > 1 else "scenario")
+        for number, one in enumerate(several(sources), start=1)
+    ]
+    paths, homes, trainers = [one.path for one in inputs], as_paths(home), as_paths(train)
     if not paths:
         raise ValueError("no source to look at")
     if bool(tune) != bool(homes):
@@ -123,11 +129,11 @@ def detect(
     names = (profiles,) if isinstance(profiles, str) else tuple(profiles)
     for word in requested:  # before anything is read that takes long
         _read_detector(word, threshold, answer_time)
-    convert = ConvertSettings.of(
-        seed=seed, library=library, allow=allow, road=road, road_path=road_path, time_limit=time_limit
-    )
-    settings = SourceSettings(convert, variants, names, ego, None if road is None else Path(road), as_mapping(columns))
-    looked_at = [source for path in paths for source in sources_of(path, settings)]
+    convert = ConvertSettings.of(seed=seed, library=library, allow=allow, road_path=road_path, time_limit=time_limit)
+    settings = SourceSettings(convert, variants, names, ego, columns=as_mapping(columns))
+    if isinstance(road, str | os.PathLike):
+        settings = settings.on(Path(road))
+    looked_at = [source for one in inputs for source in sources_of(one.path, settings.on(one.road, one.held))]
     bands = () if band_of is None else (Path(band_of),)
     files = [path for path in (*paths, *trainers, *homes, *bands) if path.is_file()]
     if sight:

@@ -11,6 +11,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
+from xosc_lateral.files.held import Held, exists
 from xosc_lateral.files.mapping import TableMapping, as_mapping
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.tables import TABLE_SUFFIXES
@@ -57,6 +58,11 @@ class SourceSettings:
     ego: str | None = None  # None: as found in a scenario; "none": there is none
     road: Path | None = None
     columns: TableMapping = field(default_factory=lambda: as_mapping(None))
+    held: Held | None = None  # a scenario in memory
+
+    def on(self, road: Path | None, held: Held | None = None) -> SourceSettings:
+        """The same, with a road that counts whatever a scenario says."""
+        return replace(self, convert=replace(self.convert, road=road), road=road, held=held)
 
 
 def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
@@ -64,7 +70,7 @@ def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
 
     Raises `FormatError`, `NotEnoughDataError`: there is nothing of that name, or nothing in it.
     """
-    if not path.exists():
+    if not exists(path):
         raise FormatError("no such file or folder", path=path)
     scenarios = _scenarios(path)
     if not scenarios:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.workflows.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile, write_table
@@ -18,7 +19,7 @@ from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, 
 if TYPE_CHECKING:
     from xosc_lateral.workflows.live.scene import Scene
 
-STATE_COLUMNS = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
+STATE_COLUMNS = (*RECOGNISED_BY, "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
 
 TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")

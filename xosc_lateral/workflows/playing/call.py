@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
 from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 
 if TYPE_CHECKING:
+    from xosc_lateral.files.held import Held
     from xosc_lateral.files.pages.figure import Figure
     from xosc_lateral.workflows.conversion.load import Played
     from xosc_lateral.world.motion.segments import SegmentRow
@@ -21,12 +23,12 @@ if TYPE_CHECKING:
 
 @declare_options
 def play(
-    scenario: PathLike, *,
+    scenario: DocumentLike, *,
     step: Annotated[float, flag(help="Length of a frame [s].", min=0.001, max=1.0)] = STEP,
     time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
-    road: PathLike | None = None,
+    road: RoadLike | None = None,
     road_path: Paths = (),
     strict: Annotated[bool, flag("--strict", help="No vehicle catalog, a run cut off, a doubt: an error.")] = False,
 ) -> Playback:  # fmt: skip
@@ -34,8 +36,8 @@ def play(
 
     Parameters
     ----------
-    scenario : str or Path
-        Maneuver-based OpenSCENARIO file.
+    scenario : str, Path, bytes, file-like, lxml tree or scenariogeneration's `Scenario`
+        Maneuver-based OpenSCENARIO file, or what one holds; `road` likewise, see `convert`.
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
 
@@ -48,27 +50,30 @@ def play(
     from xosc_lateral.workflows.conversion.load import play_scenario
 
     values = {name: str(value) for name, value in (parameters or {}).items()}
+    inputs = scenario_input(scenario, road)
     return Playback(
         play_scenario(
-            Path(scenario),
+            inputs.path,
             parameters=values,
             step=step,
             time_limit=time_limit,
             allowed=as_paths(allow),
-            roads=RoadSearch(None if road is None else Path(road), as_paths(road_path)),
+            roads=RoadSearch(inputs.road, as_paths(road_path)),
             strict=strict,
-        )
+        ),
+        inputs.held,
     )
 
 
 @declare_options
 def segments(
-    scenario: PathLike | Playback,
+    scenario: DocumentLike | Playback,
     *,
     step: float = STEP,
     time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
+    road: RoadLike | None = None,
 ) -> Segments:
     """Road-following segments of every entity, and why the rest is none; see `play`."""
     from xosc_lateral.world.scenario.controllers import controlled_entities
@@ -76,7 +81,7 @@ def segments(
     played = (
         scenario
         if isinstance(scenario, Playback)
-        else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow)
+        else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow, road=road)
     )
     driven = controlled_entities(played._played.scenario)
     lines = tuple(f"'{name}' is driven by controller {control}" for name, control in driven.items())
@@ -88,6 +93,7 @@ class Playback(Result):
     """Nominal motion: what the maneuvers alone give."""
 
     _played: Played
+    _held: Held | None = None  # what was read from memory
 
     @property
     def scenario(self) -> Path:
@@ -182,7 +188,7 @@ class Playback(Result):
         from xosc_lateral.workflows.playing.figures import view_page
 
         motion, network = self._played.motion, self._played.network
-        converted = facts_in(self.scenario.read_bytes())
+        converted = facts_in(self._played.scenario.source)
         return view_page(motion, network, source=self.scenario.name, provenance=self._provenance(), converted=converted)
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:

@@ -102,7 +102,7 @@ def fit(
             source=source or ", ".join(tables.inputs),
             licence=licence,
             inputs=dict(tables.inputs),
-            fit=dict(summary_of(tables.drives)),
+            fit=summary_of(tables.drives, tables.left_out),
         )
         profile = fit_profile(
             tables.drives,

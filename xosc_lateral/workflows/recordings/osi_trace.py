@@ -14,14 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.vehicle_classes import class_of
-from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
 from xosc_lateral.files.tables import foreign_errors, read_parquet
-from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, tracks_of_rows
 from xosc_lateral.world.motion.nominal import axes
 
 TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")  # messages of the true world; a sensor view has it as its global ground truth
@@ -223,7 +222,8 @@ class _Collected:
     things: dict[str, dict[int, Any]] = field(default_factory=lambda: {name: {} for name in LANE_FIELDS})
     latest: dict[tuple[str, int], Any] = field(default_factory=dict)  # of `things`, as last seen
     hosts: dict[int, None] = field(default_factory=dict)
-    left_out: Counter[str] = field(default_factory=Counter)
+    others: dict[int, str] = field(default_factory=dict)  # what is no vehicle, by identifier
+    lost: Counter[str] = field(default_factory=Counter)  # their rows, by what they are
     messages: int = 0
     zero: int = 0
 
@@ -256,6 +256,7 @@ class _Collected:
         if name not in self.names:
             self._meet(vehicle)
         if name not in self.kinds:
+            self.lost[self.others[name]] += 1
             return
         base = vehicle.base
         where = f"message {number}: moving object {name}"
@@ -282,42 +283,35 @@ class _Collected:
             kind = kinds.VehicleClassification.Type.Name(vehicle.vehicle_classification.type).removeprefix("TYPE_")
             self.kinds[name] = "" if kind == "UNKNOWN" else class_of(kind) or ""
         else:
-            self.left_out[kinds.Type.Name(vehicle.type).removeprefix("TYPE_").lower()] += 1
+            self.others[name] = kinds.Type.Name(vehicle.type).removeprefix("TYPE_").lower()
 
     def recorded(self, notes: list[str]) -> Recorded:
         """All of it, in order."""
         rows = np.frombuffer(self.values, dtype=np.float64).reshape(-1, ROW_SIZE)
-        notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in self.left_out.items())]
-        vehicle_numbers, codes = np.unique(rows[:, 0].astype(np.int64), return_inverse=True)
-        labels = [self.names[number] for number in vehicle_numbers.tolist()]
-        try:
-            known = identify(labels, codes, *rows[:, 1:4].T)
-        except ValueError as error:
-            raise FormatError(str(error), path=self.path) from error
-        notes += [*known.notes, *(f"{count} rows left out: {why}" for why, count in known.dropped.items())]
-        rows, vehicle, names = rows[known.rows], known.vehicle, known.names
-        same = vehicle[1:] == vehicle[:-1]
-        if not same.any():
-            raise NotEnoughDataError(f"{self.path}: no vehicle in two of {self.messages} messages")
-        step = float(np.median(np.diff(rows[:, 1])[same]))
+        others = Counter(self.others.values())
+        notes = [*notes, *(f"{count} moving objects of type {kind} left out" for kind, count in others.items())]
+        numbers, codes = np.unique(rows[:, 0].astype(np.int64), return_inverse=True)
+        labels = [self.names[number] for number in numbers.tolist()]
+        kinds = np.array([self.kinds[number] for number in numbers.tolist()], dtype=str)[codes]
+        _, time, x, y, yaw, speed, length, *rest = rows.T
+        usual = np.array([USUAL_LENGTH.get(str(kind), 4.6) for kind in kinds])
+        tracks, order = tracks_of_rows(
+            labels, codes, time, x, y, self.path, heading=yaw, speed=speed, kind=kinds, dropped=self.lost,
+            length=np.where(np.isfinite(length), length, usual),
+        )  # fmt: skip
+        notes += [*tracks.notes, *(f"{count} rows left out: {why}" for why, count in tracks.dropped.items())]
         hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
         if len(hosts) > 1:
             notes.append(f"several host vehicles: {', '.join(hosts)}")
-        _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
-        kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
-        usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
-        heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, time, step))
-        speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, time, step))
-        sides = zip(rear, axes(heading, pitch, roll), strict=True)
+        pitch, roll, *rear = (column[order] for column in rest)
+        sides = zip(rear, axes(tracks.heading, pitch, roll), strict=True)
         arm = np.sum([part[:, None] * axis for part, axis in sides], axis=0)
-        length, behind = np.where(np.isfinite(length), length, usual), -rear[0] if rear[0].any() else None
-        when, place = (time - float(time.min()), step), (x + arm[:, 0], y + arm[:, 1], heading)
-        tracks = Tracks(
-            names, vehicle, *when, *place, speed, length, kinds, rear=behind, recording=known.recording,
-            recordings=known.recordings, dropped=known.dropped,
+        tracks = replace(
+            tracks, time=tracks.time - float(tracks.time.min()), x=tracks.x + arm[:, 0], y=tracks.y + arm[:, 1],
+            rear=-rear[0] if rear[0].any() else None, notes=(),
         )  # fmt: skip
-        numbers = {name: str(number) for number, name in self.names.items()}
-        return Recorded(tracks, self.things, hosts, numbers, notes)
+        stated = {name: str(number) for number, name in self.names.items()}
+        return Recorded(tracks, self.things, hosts, stated, notes)
 
 
 BEYOND_END = 1e-3  # points farther than this past the end of a line go on with it [m]

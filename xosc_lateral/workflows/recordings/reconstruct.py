@@ -29,6 +29,7 @@ from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
+from xosc_lateral.files.remote import local
 from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
 from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
@@ -76,7 +77,7 @@ def reconstruct(
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
     kind, road, case = settings.format, settings.road, settings.case
-    traffic = read_recording(Path(recording), kind=kind, road=road, columns=columns, recording=case)
+    traffic = read_recording(local(recording), kind=kind, road=road, columns=columns, recording=case)
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)

@@ -19,7 +19,7 @@ from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
 from xosc_lateral.workflows.recordings.cuts import require_along_lanes
-from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
+from xosc_lateral.workflows.recordings.importers import dlr_ht, dlr_ut, levelx
 from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.importers.tracks import LaneShape
@@ -107,7 +107,7 @@ def format_of(source: Path) -> str:
     """A recording's format by its name; a table, where nothing else fits."""
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
-        return "dlr-ht"
+        return "dlr-ut" if "urban" in name else "dlr-ht"
     if source.is_dir() or name.endswith("_tracks.csv"):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
@@ -231,7 +231,10 @@ def driven_lanes(shapes: Sequence[LaneShape], graph: LaneGraph) -> list[DrivenLa
 def _made(road: WrittenRoad, tracks: Tracks, source: Path, *notes: str) -> RecordedTraffic:
     data, (vehicles, odd) = road.to_xml().encode(), _vehicles(tracks)
     network = parse_opendrive(data, road.name)
-    return RecordedTraffic(road.name, vehicles, network, data, f"{road.name}.xodr", (source,), (*notes, *odd))
+    return RecordedTraffic(
+        road.name, vehicles, network, data, f"{road.name}.xodr", (source,), (*notes, *tracks.notes, *odd),
+        dropped=tracks.dropped, read=len(tracks.x),
+    )  # fmt: skip
 
 
 def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -246,7 +249,10 @@ def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     short = _short(table["id"].astype(str).to_numpy(dtype=str))
     names = tuple(short[str(name)] for name in table["id"][np.r_[True, np.diff(vehicle) != 0]])
     place = x - made.origin[0], y - made.origin[1], np.full(len(x), np.nan)  # headings are not recorded
-    tracks = Tracks(names, vehicle, time, dlr_ht.STEP, *place, speed, length, kinds, width, height=height)
+    dropped = table.attrs["dropped"]
+    tracks = Tracks(
+        names, vehicle, time, dlr_ht.STEP, *place, speed, length, kinds, width, height=height, dropped=dropped
+    )
     note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
     return _made(made, tracks, source, note)
 
@@ -264,16 +270,15 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
     recording.require(levelx.HIGHD_COLUMNS)
     lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
-    table = table.sort_values(["id", "frame"], ignore_index=True)
+    table = recording.identified("id", "x", "y")
     meta = meta.set_index("id").loc[table["id"]]
     kind = recording.classes(meta)
     is_ahead = meta["drivingDirection"].to_numpy() == 2
-    vehicle, ids = table["id"].factorize()
     time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
     x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
     place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
-    when = tuple(map(str, ids)), vehicle, time, 1.0 / rate
-    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy())
+    when = tuple(table["name"].unique()), table["vehicle"].to_numpy(), time, 1.0 / rate
+    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy(), dropped=recording.dropped)
     middle = 0.5 * (upper[-1] + lower[0])
     sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
     left, right = (
@@ -313,6 +318,16 @@ def dlr_road(lanes: dlr_ht.Carriageways) -> WrittenRoad:
     return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
+def _dlr_ut(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    tracks, shapes, graph, _ = dlr_ut.read_streams(source)
+    made = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), "dlr-ut").encode()
+    note = "the road is that of the traffic: lanes are the mean paths of its vehicles, their width is assumed"
+    traffic = _on_road(tracks, source, road, made)
+    return replace(
+        traffic, name="dlr-ut", road_name="dlr-ut.xodr" if road is None else road.name, notes=(*traffic.notes, note)
+    )
+
+
 READERS: dict[str, Callable[[Path, Path | None, TableMapping], RecordedTraffic]] = {
-    "dlr-ht": _dlr, "levelx": _levelx, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
+    "dlr-ht": _dlr, "dlr-ut": _dlr_ut, "levelx": _levelx, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
 }  # fmt: skip

@@ -13,7 +13,7 @@ from xosc_lateral.drivers.fitting.models.likelihood import (
     fit_autoregression,
     partial_autocorrelations,
 )
-from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
+from xosc_lateral.drivers.model.core.autoregressive.parameters import MAX_ROOT, Autoregression
 from xosc_lateral.drivers.model.linear_filters import recur
 
 THIRD_ORDER = np.array([1.2, -0.5, 0.1])
@@ -40,12 +40,9 @@ def test_the_likelihood_is_that_of_one_normal_vector(wild: float) -> None:
     sums = DriverSums.of(runs, 3, every=1, drivers=list(WHOSE))
     sizes = {"a": 1.0, "b": wild, "c": 1.0}
     places = [(THIRD_ORDER, 1.3), (0.7 * THIRD_ORDER, 0.2), (np.array([0.5, 0.1, -0.3]), 40.0)]
-    found = [
-        sums.cost(
-            np.append(np.arctanh(partial_autocorrelations(a)), np.log(ratio)), sums.weighted(np.array([1.0, wild, 1.0]))
-        )
-        for a, ratio in places
-    ]
+    within = MAX_ROOT ** np.arange(1.0, 4.0)  # what is searched through are memories no longer than a model may have
+    parameters = [np.append(np.arctanh(partial_autocorrelations(a / within)), np.log(ratio)) for a, ratio in places]
+    found = sums.cost(np.array(parameters), sums.weighted(np.array([1.0, wild, 1.0])))
     expected = [dense_cost(runs, a, ratio, sizes) for a, ratio in places]
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-5)  # but for the ridge
 

@@ -9,6 +9,7 @@
 5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
    standard deviation, of the offset and of its differences. What differs corrects the scales, the volatilities and
    their correlation, and windows of both the spectrum of either part (indirect inference [1]_).
+6. Bursts, as far as the kurtosis of lateral speed shows them beyond chance (`bursts`).
 
 Everything is deterministic: the simulations draw from a fixed seed.
 
@@ -40,6 +41,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     scaled_spectrum,
     window_of,
 )
+from xosc_lateral.drivers.fitting.models.bursts import with_bursts
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     BORDER,
@@ -150,6 +152,8 @@ def fit_autoregressive(
     )
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
     model = matched(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))), runs, settings)
+    length = round(settings.snippet / settings.step) + 1
+    model = with_bursts(model, runs, drives, lambda made: _drives_of(made, length, settings.seed, SIMULATED_DRIVERS))
     return rounded(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from xosc_lateral.base.track import Track
+from xosc_lateral.files.held import exists, held_at
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
@@ -89,6 +90,8 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
     """Rewrite relative file references: they lead where they led before; a road found elsewhere is repaired."""
     scenario = draft.scenario
     old, new = _absolute(scenario.path).parent, _absolute(output).parent
+    if held_at(old) is not None:  # nobody knows where its files will lie
+        new = old
     # Folders of catalogs that lie in none of the scenario's catalog locations.
     known = [_absolute(path) for path in scenario.catalog_locations.values()]
     known += [path.parent for path in known if path.suffix.lower() == ".xosc"]
@@ -108,9 +111,9 @@ def rewrite_paths(draft: Draft, output: Path) -> None:
             if is_town(text):
                 continue
             target = _absolute(scenario.road_file)
-        elif tag == "Directory" and len(found_elsewhere) == 1 and not leads_to.exists():
+        elif tag == "Directory" and len(found_elsewhere) == 1 and not exists(leads_to):
             target = found_elsewhere.pop()
-        elif attribute == "model3d" and not leads_to.exists():
+        elif attribute == "model3d" and not exists(leads_to):
             continue
         stays = old == new or Path(text).is_absolute() or text[1:2] == ":"
         if text and not (target == leads_to and stays):

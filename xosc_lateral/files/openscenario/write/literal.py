@@ -11,6 +11,7 @@ from pathlib import Path
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario.element import XmlElement, children_of, elements, local_name, parent_of
 from xosc_lateral.files.openscenario.references import NAMES, entry_scope, local_scope
 from xosc_lateral.files.openscenario.write.draft import Draft, unchanged
@@ -121,6 +122,6 @@ def _inline(reference: XmlElement, entry: etree._Element, path: Path, scenario: 
         for name in ("model3d", "filepath"):
             # As seen from the scenario.
             file = path.parent / (item.get(name) or "")
-            if item.get(name) and not Path(item.get(name) or "").is_absolute() and file.is_file():
+            if item.get(name) and not Path(item.get(name) or "").is_absolute() and is_file(file):
                 item.set(name, Path(os.path.relpath(file, scenario.path.parent)).as_posix())
     parent_of(reference.xml).replace(reference.xml, entry)

@@ -8,6 +8,7 @@ a damaged source ends in one line. `ImportedDrives.write` puts both into one fil
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -28,6 +29,7 @@ from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.files.drives import file_label, file_labels
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
+from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.options import declare_options
@@ -39,6 +41,7 @@ Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 
 IMPORTERS = {
     "dlr-ht": ".dlr_ht:import_dlr_ht",
+    "dlr-ut": ".dlr_ut:import_dlr_ut",
     "levelx": ".levelx:import_levelx",
     "openacc": ".openacc:import_openacc",
     "mf4": ".mf4:import_mf4",
@@ -74,7 +77,7 @@ def import_drives(
     Parameters
     ----------
     format : str
-        "dlr-ht" (DLR Highway Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
+        "dlr-ht", "dlr-ut" (DLR Highway, Urban Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
         "tracks" (x, y on an OpenDRIVE road), "fcd" (SUMO), "commonroad" (extra `commonroad`),
         "osi" (ASAM OSI traces; extra `osi`), or a plug-in's.
     source : path or paths
@@ -87,11 +90,32 @@ def import_drives(
     FormatError
         An unknown format, or a source that can't be read.
     """
-    sources = as_paths(source)
+    sources = tuple(inputs_of(as_paths(source)))
     if not sources:
         raise ValueError("no source to import")
-    made = find_importer(format)(sources[0] if len(sources) == 1 else sources, **options)
+    read = find_importer(format)
+    made = read(sources[0] if len(sources) == 1 else sources, **_told(read, format, options))
     return as_imported(made, format, sources, options)
+
+
+NUMBERS = {"float": float, "int": int, float: float, int: int}
+"""Annotation of an option -> what makes a number of a text."""
+
+
+def _told(read: Callable[..., object], format: str, options: Mapping[str, Any]) -> dict[str, Any]:  # noqa: A002
+    """Options that a reader has; texts of the command line become numbers where it says so. Raises `FormatError`."""
+    _, *known = inspect.signature(read).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
+        return dict(options)
+    kinds, told = {parameter.name: parameter.annotation for parameter in known}, {}
+    for name, value in options.items():
+        if name not in kinds:
+            raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
+        try:
+            told[name] = NUMBERS.get(kinds[name], str)(value) if isinstance(value, str) else value
+        except ValueError as error:
+            raise FormatError(f"importer {format!r}: {name} {value!r} is not a number") from error
+    return told
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_each, importer, paths_of
-from xosc_lateral.workflows.recordings.importers.track_table import Tracks, ground_speed, travel_heading
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, tracks_of_rows
 from xosc_lateral.workflows.recordings.importers.tracks import (
     LaneShape,
     curvature_along,
@@ -102,15 +102,12 @@ def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
         kinds.append(class_of(obstacle.obstacle_type.value) or "")
     if len(rows) < 2:
         raise NotEnoughDataError(f"{path}: no obstacle with a recorded trajectory")
-    values = np.array(rows, dtype=np.float64)
-    values = values[np.lexsort((values[:, 1], values[:, 0]))]
-    values = values[np.r_[True, (np.diff(values[:, :2], axis=0) != 0).any(axis=1)]]
-    vehicle, step = values[:, 0].astype(np.int64), float(scenario.dt)
-    x, y, time = values[:, 2], values[:, 3], step * values[:, 1]
-    heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, time, step))
-    speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, time, step))
-    length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
-    return Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
+    vehicle, step, x, y, heading, speed = np.array(rows, dtype=np.float64).T
+    whose = vehicle.astype(np.int64)
+    return tracks_of_rows(
+        names, whose, float(scenario.dt) * step, x, y, path, heading=heading, speed=speed, step=float(scenario.dt),
+        length=np.array(lengths)[whose], kind=np.array(kinds)[whose],
+    )[0]  # fmt: skip
 
 
 class _Lanelet(LaneShape):

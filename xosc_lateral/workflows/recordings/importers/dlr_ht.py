@@ -23,6 +23,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -35,6 +36,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.filters import filtered, low_pass_between
+from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.source import open_source
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import (
@@ -118,12 +120,18 @@ def import_dlr_ht(
             size = {"length_m": round(lane.end - lane.start, 1), "stretches": lane.passages}
             lanes.append({"carriageway": carriageway, "lane_index": index, **size, "centre_standard_error_m": known})
     about = {"format": "dlr-ht", "version": _version(source), "licence": LICENCE, "lanes": lanes}
+    about |= {"dropped": tracks.attrs["dropped"]}
     return imported(table, sources=[source], settings=asdict(settings), step=STEP, **about)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
-    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
-    frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
+    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0.
+
+    `attrs["dropped"]`: rows of the files that are not in it, by reason.
+    """
+    frame = pd.concat(
+        [_read_csv(stream, source) for stream in files_of(source, "DLR-Highway-Traffic")], ignore_index=True
+    )
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
     except ValueError as error:
@@ -131,12 +139,18 @@ def read_tracks(source: Path) -> pd.DataFrame:
     if frame.empty:
         raise NotEnoughDataError(f"{source}: no rows")
     frame["time"] = (stamps - stamps.min()).dt.total_seconds()
-    frame = frame.drop_duplicates(["id", "time"]).sort_values(["id", "time"], ignore_index=True)
-    frame["vehicle"] = np.unique(frame["id"].to_numpy(), return_inverse=True)[1]
+    labels, vehicle = np.unique(frame["id"].to_numpy(), return_inverse=True)
+    time, x, y = (frame[name].to_numpy() for name in ("time", "center_easting", "center_northing"))
+    known = identify([str(label) for label in labels], vehicle, time, x, y, path=source)
+    frame = frame.iloc[known.rows].reset_index(drop=True).assign(vehicle=known.vehicle)
+    if len(known.names) > len(labels):  # an identifier that is another vehicle's from some row on
+        frame["id"] = np.array(known.names, dtype=object)[known.vehicle]
+    frame.attrs["dropped"] = dict(known.dropped)
     return frame
 
 
-def _trajectory_files(source: Path) -> list[io.BytesIO]:
+def files_of(source: Path, data_set: str, kind: str = "trajectories") -> list[io.BytesIO]:
+    """CSV files of a kind, out of a data set of the DLR: in a wheel of tasi, in its zip, or one by itself."""
     with open_source(source) as opened:
         if not zipfile.is_zipfile(opened.file):
             opened.file.seek(0)
@@ -144,16 +158,16 @@ def _trajectory_files(source: Path) -> list[io.BytesIO]:
         try:
             archive = zipfile.ZipFile(opened.file)
             opened.unpacked(sum(item.file_size for item in archive.infolist()))
-            inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+            inner = [name for name in archive.namelist() if data_set in name and name.endswith(".zip")]
             if inner:
                 archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
                 opened.unpacked(sum(item.file_size for item in archive.infolist()))
-            names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+            names = sorted(name for name in archive.namelist() if f"/{kind}/" in name and name.endswith(".csv"))
             files = [io.BytesIO(archive.read(name)) for name in names]
         except zipfile.BadZipFile as error:
             raise FormatError(f"damaged zip: {error}", path=source) from error
     if not files:
-        raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
+        raise FormatError(f"holds no {kind} of {data_set.replace('-', ' ')} ({kind}/*.csv)", path=source)
     return files
 
 
@@ -275,10 +289,10 @@ def _each(passage: IntArray, every: int) -> BoolArray:
     return np.asarray(position % every == 0)
 
 
-def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:
+def vehicle_classes(tracks: pd.DataFrame, classes: Sequence[str] = CLASSES) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
-    scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
-    return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
+    scores = tracks[[f"classifications_{name}" for name in classes]].to_numpy()
+    return np.asarray(np.array(classes)[scores.argmax(axis=1)])
 
 
 def _version(source: Path) -> str:

@@ -13,6 +13,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,12 +22,13 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import ON_ROADS, TRUCKS, class_named
+from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files import sumo
 from xosc_lateral.files.columns import require_row_step
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
-from xosc_lateral.workflows.recordings.importers.track_table import Tracks
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, tracks_of_rows
 from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
 from xosc_lateral.workflows.recordings.roads_from_lanes import DrivenLane
 
@@ -54,22 +56,27 @@ def import_fcd(
     vehicle_types = sumo.read_vehicle_types(None if types is None else Path(types))
     rows = pd.DataFrame(_rows(vehicles, source), columns=list(ROW_COLUMNS))
     rows["is_inner"] = rows["lane"].astype(str).str.startswith(":")
-    rows = rows[~rows["is_inner"]] if known is None else rows
+    every, rows = len(rows), rows[~rows["is_inner"]] if known is None else rows
     if rows.empty:
         raise NotEnoughDataError(f"{source}: no vehicle")
-    rows = rows.sort_values(["name", "time"], kind="stable", ignore_index=True)
+    codes, labels = rows["name"].factorize(sort=True)
+    time, x, y = (rows[name].to_numpy() for name in ("time", "x", "y"))
+    seen = identify(list(map(str, labels)), codes, time, x, y, path=source)
+    dropped = {"junction": every - len(rows), **seen.dropped}
+    rows = rows.iloc[seen.rows].assign(name=np.array(seen.names, dtype=object)[seen.vehicle]).reset_index(drop=True)
     lanes = _net_of(rows, lane_width) if known is None else known
     strange = rows["lane"][~rows["lane"].isin(list(lanes.lanes))]
     if len(strange):
         raise FormatError(f"lane {strange.iloc[0]!r} is not in {net}", path=source)
     left_hand = _left_hand(rows, lanes, None if known is None else known.left_hand, source)
     table = _drive_table(rows, lanes, vehicle_types, left_hand, source)
-    notes = ["left-hand traffic: lanes and sides are counted from the left kerb, and turned"] if left_hand else []
+    turned = "left-hand traffic: lanes and sides are counted from the left kerb, and turned"
+    notes = [*seen.notes, *([turned] if left_hand else [])]
     if known is None:
         notes.append("without --net: lanes without a width, and nobody is seen on another edge")
     sources = [source, *(Path(file) for file in (net, types) if file is not None)]
     settings = {"lane_width": lane_width if net is None else None}
-    about = {"format": "fcd", "licence": LICENCE, "settings": settings, "notes": notes}
+    about = {"format": "fcd", "licence": LICENCE, "settings": settings, "notes": notes, "dropped": dropped}
     step = float(np.median(np.diff(np.unique(table["time"])))) if table["time"].nunique() > 1 else 0.0
     return imported(table, sources=sources, step=step, **about)
 
@@ -187,21 +194,19 @@ def read_fcd(path: Path) -> Tracks:
         rows.append((names[name], time, *(sumo.number_of(element, key, path) for key in ("x", "y", "angle", "speed"))))
     if not rows:
         raise NotEnoughDataError(f"{path}: no vehicle")
-    values = np.array(rows)
-    values = values[np.lexsort((values[:, 1], values[:, 0]))]
-    vehicle, (time_of_row, x, y, angle, speed) = values[:, 0].astype(np.int64), values[:, 1:].T
-    same = vehicle[1:] == vehicle[:-1]
-    if not same.any():
-        raise NotEnoughDataError(f"{path}: no vehicle has two rows")
+    number, time, x, y, angle, speed = np.array(rows).T
+    vehicle = number.astype(np.int64)
     kind = np.array([name if (name := class_named(word)) in ON_ROADS else "" for word in types])[vehicle]
     length = np.array([sumo.usual_length(name) for name in types])[vehicle]
-    heading = 0.5 * np.pi - np.radians(angle)
-    for part in np.split(np.arange(len(x)), np.flatnonzero(~same) + 1):
-        first, behind = part[0], REAR_FROM_FRONT * length[part[0]]
+    tracks, _ = tracks_of_rows(
+        list(names), vehicle, time, x, y, path, heading=0.5 * np.pi - np.radians(angle), speed=speed, kind=kind,
+        length=length, rear=(REAR_FROM_FRONT - 0.5) * length,
+    )  # fmt: skip
+    x, y, heading = tracks.x, tracks.y, tracks.heading
+    for part in np.split(np.arange(len(x)), np.flatnonzero(np.diff(tracks.vehicle)) + 1):
+        first, behind = part[0], REAR_FROM_FRONT * tracks.length[part[0]]
         start = [x[first] - behind * np.cos(heading[first]), y[first] - behind * np.sin(heading[first])]
         front = np.vstack([start, np.stack([x[part], y[part]], axis=1)])
         way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(front, axis=0).T))]
         x[part], y[part] = (np.interp(way[1:] - behind, way, front[:, axis]) for axis in (0, 1))
-    when = time_of_row - float(time_of_row.min()), float(np.median(np.diff(time_of_row)[same]))
-    rear = (REAR_FROM_FRONT - 0.5) * length
-    return Tracks(tuple(names), vehicle, *when, x, y, heading, speed, length, kind, rear=rear)
+    return replace(tracks, time=tracks.time - float(tracks.time.min()))

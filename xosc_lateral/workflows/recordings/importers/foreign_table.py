@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +16,13 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import TRUCKS, class_of
-from xosc_lateral.files.columns import comma_numbers
-from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, translated
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.files.columns import EPOCHS_BEGIN, comma_numbers, no_time, usual_marker
+from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, parts_of
-from xosc_lateral.files.tables import read_table, text_encoding
-from xosc_lateral.workflows.recordings.importers import paths_of
+from xosc_lateral.files.tables import read_table, text_layout
+from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
+from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, paths_of
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -73,29 +78,59 @@ LISTED_TEXTS = 12  # so many different texts are written out at most
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
 
-def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
-    """Tables under standard names and units, as they can be read; without `drive`, a drive called after its file."""
-    known = as_mapping(mapping)
-    files = paths_of(sources)
-    made = []
+def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> ImportedDrives:
+    """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
+    again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
+    """
+    known, files = as_mapping(mapping), paths_of(sources)
+    made, lost, drives = list[pd.DataFrame](), Counter[str](), list[Drive]()
     for path, label in zip(files, file_labels(files), strict=True):
-        table = translated(read_table(path, known), known, path)
-        drives_of_table(table, TableMapping(), path)
-        if "drive" not in table:
-            table.insert(0, "drive", label)
+        read = read_table(path, known)
+        table = translated(read, known, path)
+        lost["not chosen"] += len(read) - len(table)
+        drives += drives_of_table(table, TableMapping(), path, lost)
+        names = np.empty(len(table), dtype=object)
+        for name, rows in rows_of_drives(table, path, label):
+            names[rows] = name
+        table = table.drop(columns=["drive", "recording"], errors="ignore")
+        table.insert(0, "drive", names)
         made.append(table)
-    for table, names in zip(made, labels_apart(files, [table["drive"].unique() for table in made]), strict=True):
-        table["drive"] = table["drive"].map(names)
-    return pd.concat(made, ignore_index=True)
+    for table, apart in zip(made, labels_apart(files, [table["drive"].unique() for table in made]), strict=True):
+        table["drive"] = table["drive"].map(apart)
+    table = pd.concat(made, ignore_index=True)
+    step = float(np.median(np.concatenate([np.diff(drive.time) for drive in drives])))
+    recorded = imported(
+        table.assign(state=KEPT_ROWS), format="table", sources=files, licence="your own recording", settings={},
+        step=step,
+    )  # fmt: skip
+    kept = sum(map(len, drives))
+    record = replace(
+        recorded.provenance, rows=dict(+Counter({KEPT_ROWS: kept, **lost})), hours=round(kept * step / 3600.0, 3)
+    )
+    return ImportedDrives(table, record)
 
 
-def propose_mapping(files: Sequence[Path]) -> str:
-    """TOML of a mapping of these tables, with what each line was guessed from."""
-    tables = [read_table(path).rename(columns=lambda name: str(name).strip()) for path in files]
+class Recognised(NamedTuple):
+    """A column of a table by its standard name, and what that was seen from."""
+
+    name: str
+    header: str
+    unit: str  # empty: none is stated, or seen by the size of the values
+    why: str
+    values: pd.Series
+
+    @property
+    def numbers(self) -> FloatArray:
+        """What is a number in it."""
+        return _numbers(self.values)
+
+
+def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recognised], list[str]]:
+    """Columns that all tables have, as their headers and values show them; and those that keep their names."""
+    tables = [table.rename(columns=lambda name: str(name).strip()) for table in tables]
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
     if not shared:
-        raise FormatError("the tables have no column in common", path=files[-1])
-    values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
+        raise FormatError("the tables have no column in common", path=path)
     headers: dict[str, str] = {}
     for header in shared:
         bare, _ = parts_of(header)
@@ -106,25 +141,54 @@ def propose_mapping(files: Sequence[Path]) -> str:
         name = next((name for name in (placed, *usual) if name is not None and name not in headers), None)
         if name is not None:
             headers[name] = header
-    needed = ("time",) if SIDES.keys() <= headers.keys() else ("time", "offset", "lane_width")
-    codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
+    values = {header: pd.concat([table[header] for table in tables], ignore_index=True) for header in headers.values()}
+    found = [Recognised(name, header, *_unit_of(name, header, values[header]), values[header])
+             for name, header in headers.items()]  # fmt: skip
+    return found, [header for header in shared if header not in values]
+
+
+def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) -> str:
+    """TOML of a mapping of these tables, with what each line was guessed from; `mapping`: what is known."""
+    known = mapping or TableMapping()
+    found, left = recognised([read_table(path, known) for path in files], files[-1])
+    headers = {one.name for one in found}
+    needed = ("time",) if SIDES.keys() <= headers else ("time", "offset", "lane_width")
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
         '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
-        *(f"encoding = {_quoted(code)}" for code in codes[:1]),
+        *_text_lines(files, known, found),
         "",
         "[columns]",
-        *(_line(name, header, values[header]) for name, header in headers.items()),
-        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in headers),
+        *map(_line, found),
+        *(
+            f'# {name} = "?"  # needed, and not found; {no_time(left, "") if name == "time" else ""}'.rstrip("; ")
+            for name in needed
+            if name not in headers
+        ),
     ]
-    for name, header in headers.items():
-        if name != "drive" and not len(_numbers(values[header])):
-            lines += _texts(name, values[header])
-    left = [header for header in shared if header not in headers.values()]
+    for one in found:
+        if one.name != "drive" and not len(one.numbers):
+            lines += _texts(one.name, one.values)
     if left:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
     return "\n".join(lines)
+
+
+def _text_lines(files: Sequence[Path], known: TableMapping, found: Sequence[Recognised]) -> list[str]:
+    """How the tables are written, where that is not plain, and what stands for no value."""
+    seen = [seen for path in files if (seen := text_layout(path, known)) is not None]
+    codes, layouts = {code for code, _ in seen}, {layout[2:] for _, layout in seen}
+    lines = [f"encoding = {_quoted(code)}" for code in sorted(codes - {"utf-8"})[:1]]
+    if len(layouts) == 1 and (layout := seen[0][1]) and (layout.header > 1 or layout.units):
+        lines += [f"separator = {_quoted(layout.separator or ',')}", f"header = {layout.header}  # line"]
+        lines += [f"units = {layout.unit_row}  # line"] if layout.units else []
+    markers = {one.header: marker for one in found if (marker := usual_marker(one.numbers, one.header)) is not None}
+    if markers:
+        why = "; ".join(f"{value:g} in {rows} of {header}" for header, (value, rows) in markers.items())
+        numbers = ", ".join(f"{value:g}" for value in sorted({value for value, _ in markers.values()}))
+        lines.append(f"missing = [{numbers}]  # CHECK: {why}")
+    return lines
 
 
 def _place_named(bare: str) -> str | None:
@@ -142,27 +206,33 @@ def _place_named(bare: str) -> str | None:
     return "offset" if means_offset else None
 
 
-def _line(name: str, header: str, column: pd.Series) -> str:
+def _unit_of(name: str, header: str, column: pd.Series) -> tuple[str, str]:
+    """Unit of a column, and what it was seen from."""
     _, unit = parts_of(header)
-    why = "by its header"
     if unit:
         try:
             factor(name, unit)
-            why = "unit by its header"
+            return unit, "unit by its header"
         except ValueError:
-            unit = ""
-    numbers = _numbers(column)
-    if not unit and len(numbers):
-        size = float(np.median(np.abs(numbers)))
-        unit = next((unit for low, high, unit in BY_SIZE.get(name, ()) if low <= size < high), "")
-        if name == "time" and len(numbers) > 1 and 2.0 <= float(np.median(np.abs(np.diff(numbers)))) <= 1000.0:
-            unit = "ms"
-        why = "unit by the size of its values" if unit else why
+            pass
+    if not len(numbers := _numbers(column)):
+        return "", "by its header"
+    size = float(np.median(np.abs(numbers)))
+    unit = next((unit for low, high, unit in BY_SIZE.get(name, ()) if low <= size < high), "")
+    if name == "time" and float(np.median(numbers)) > EPOCHS_BEGIN:
+        return "", "counts since 1970, by its size"
+    if name == "time" and len(numbers) > 1:
+        unit = "ms" if 2.0 <= float(np.median(np.abs(np.diff(numbers)))) <= 1000.0 else unit
+    return unit, "unit by the size of its values" if unit else "by its header"
+
+
+def _line(one: Recognised) -> str:
+    numbers = one.numbers
     seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
-    sign = f"; CHECK: {SIGNS[name]}" if name in SIGNS else ""
-    source = f"{header}:{unit}" if unit else header
-    entry = f"{{column = {_quoted(header)}}}" if ":" in header and not unit else _quoted(source)
-    return f"{name} = {entry}  # {why}{seen}{sign}"
+    sign = f"; CHECK: {SIGNS[one.name]}" if one.name in SIGNS else ""
+    source = f"{one.header}:{one.unit}" if one.unit else one.header
+    entry = f"{{column = {_quoted(one.header)}}}" if ":" in one.header and not one.unit else _quoted(source)
+    return f"{one.name} = {entry}  # {one.why}{seen}{sign}"
 
 
 def _numbers(column: pd.Series) -> FloatArray:

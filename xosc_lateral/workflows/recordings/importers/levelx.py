@@ -127,10 +127,7 @@ class Recording:
         """Rows by vehicle and time, with `vehicle`, and its `name`; see `dropped`."""
         codes, labels = self.tracks[name].factorize(sort=True)
         time, east, north = (self.tracks[column].to_numpy(dtype=np.float64) for column in ("frame", x, y))
-        try:
-            known = identify([str(label) for label in labels], codes, time / self.frame_rate, east, north)
-        except ValueError as error:
-            raise FormatError(str(error), path=self.path) from error
+        known = identify([str(label) for label in labels], codes, time / self.frame_rate, east, north, path=self.path)
         self.dropped.update(known.dropped)
         names = np.array(known.names, dtype=object)[known.vehicle]
         return self.tracks.iloc[known.rows].reset_index(drop=True).assign(vehicle=known.vehicle, name=names)

@@ -20,10 +20,11 @@ from __future__ import annotations
 
 import io
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
+from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import unpacked_text
 from xosc_lateral.workflows.options import flag
@@ -68,7 +70,8 @@ def import_openacc(
 ) -> ImportedDrives:
     """OpenACC's platoons on the closed loop of AstaZero: lane centre from all passes of all files."""
     paths = paths_of(source)
-    cars = [car for path in paths for car in _cars(path)]
+    dropped, leaps = Counter[str](), list[str]()
+    cars = [car for path in paths for car in _cars(path, dropped, leaps)]
     if not cars:
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
     frames = []
@@ -77,9 +80,10 @@ def import_openacc(
             frames += _placed(same, _centre_line(same), lane_width)
     table = pd.concat(frames, ignore_index=True)
     note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"
-    about = {"format": "openacc", "version": "AstaZero 2019", "licence": LICENCE, "notes": (note,)}
+    about: dict[str, Any] = {"format": "openacc", "version": "AstaZero 2019", "licence": LICENCE}
     step = float(np.median(np.diff(cars[0].time)))
-    return imported(table, sources=paths, settings={"lane_width": lane_width}, step=step, **about)
+    about |= {"settings": {"lane_width": lane_width}, "notes": (note, *leaps), "dropped": dropped}
+    return imported(table, sources=paths, step=step, **about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +109,8 @@ class _Car:
         return 1.0 if area >= 0.0 else -1.0
 
 
-def _cars(path: Path) -> list[_Car]:
+def _cars(path: Path, dropped: Counter[str], notes: list[str]) -> list[_Car]:
+    """Those that move; `dropped`, `notes`: of the others' rows, and of what is no car's."""
     with open_source(path) as opened:
         lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
     heads = [k for k, line in enumerate(lines[:HEADER_LINES]) if line.split(",")[0].strip().lower() == "time"]
@@ -124,11 +129,21 @@ def _cars(path: Path) -> list[_Car]:
     cars = []
     for k in numbers:
         x, y, speed = (values[f"{name}{k}"] for name in ("E", "N", "Speed"))
-        if np.isfinite(speed).any() and np.nanmax(speed) > MINIMUM_SPEED:
-            lead = values.get(f"IVS{k - 1}", np.full(len(frame), np.nan))
-            there = np.isfinite(x) & np.isfinite(y) & np.isfinite(speed)
-            columns = (values["Time"], x, y, speed, lead)
-            cars.append(_Car(f"{path.name.split('.')[0]}:{k}", *(column[there] for column in columns)))
+        if not (np.isfinite(speed).any() and np.nanmax(speed) > MINIMUM_SPEED):
+            dropped["stands"] += len(frame)
+            continue
+        lead = values.get(f"IVS{k - 1}", np.full(len(frame), np.nan))
+        there = np.isfinite(values["Time"]) & np.isfinite(x) & np.isfinite(y) & np.isfinite(speed)
+        time, *columns = (column[there] for column in (values["Time"], x, y, speed, lead))
+        name = f"{path.name.split('.')[0]}:{k}"
+        known = identify([name], np.zeros(len(time), dtype=np.int64), time, columns[0], columns[1], path=path)
+        dropped.update({"no place": len(frame) - len(time), **known.dropped})
+        notes += known.notes
+        parts = (known.rows[known.vehicle == number] for number in range(len(known.names)))
+        cars += [
+            _Car(called, time[part], *(column[part] for column in columns))
+            for called, part in zip(known.names, parts, strict=True)
+        ]
     return cars
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,20 +23,21 @@ from xosc_lateral.files.columns import (
     chosen_rows,
     epoch_factor,
     listed,
+    no_time,
     numbers_of,
     require_row_step,
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import (
     UNITS,
+    ColumnSource,
     MappingLike,
     TableMapping,
     as_mapping,
     parse_map,
-    plain_header,
     standard_sources,
 )
-from xosc_lateral.files.output_tables import COLUMNS
+from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import foreign_errors, read_table, unpacked_text
 from xosc_lateral.workflows.recordings.cuts import MOVING_SPEED, require_headings
@@ -57,11 +59,6 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type", "vehicle_type", "object_category"),
 }
 """Name -> headers that are understood, as `plain_header` has them, the first that is there; others by the map."""
-
-FRAMES = ("frame", "frame_id", "frame_num", "frame_number", "timestep", "time_step")  # counts, of a rate not in them
-
-STATE_COLUMNS = frozenset(COLUMNS) - {"z", "offset_t"}
-"""What a table of states has, whether `play` or `live` wrote it; its positions are those of reference points."""
 
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
@@ -154,8 +151,8 @@ def tracks_of(
     table: pd.DataFrame, path: Path, columns: Sequence[str], saved: TableMapping, *, is_log: bool = False
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
-    is_played = set(map(str, table.columns)) >= STATE_COLUMNS
-    if is_played:  # a table of states, as `play` and `live` write it
+    is_played = set(map(str, table.columns)) >= set(RECOGNISED_BY)
+    if is_played:  # its positions are those of reference points
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     rows, lost = _columns(table, path, saved, columns)
     codes, labels = rows["vehicle"].factorize(sort=True)
@@ -165,40 +162,58 @@ def tracks_of(
     steps = np.diff(time[order])[(np.diff(codes[order]) == 0) & (np.diff(time[order]) > 0.0)]
     if len(steps):  # in a wrong unit, all that moves leaps
         require_row_step(float(np.median(steps)), path)
-    recording = list(rows["recording"]) if "recording" in rows else None
-    try:
-        known = identify(list(map(str, labels)), codes, time, x, y, recording)
-    except ValueError as error:
-        raise FormatError(str(error), path=path) from error
-    rows, vehicle, names = rows.iloc[known.rows], known.vehicle, known.names
-    time, x, y = (values[known.rows] for values in (time, x, y))
-    same = vehicle[1:] == vehicle[:-1]
-    if not same.any():
+    given: dict[str, Any] = {name: rows[name].to_numpy(dtype=np.float64) for name in STATED if name in rows}
+    kinds = rows["vehicle_class"].to_numpy(dtype=str) if "vehicle_class" in rows else np.full(len(rows), "")
+    usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
+    length = np.where(np.isfinite(stated := given.pop("length", usual)), stated, usual)
+    if "rear" in given:
+        given["rear"] = np.nan_to_num(given["rear"])
+    tracks, _ = tracks_of_rows(
+        list(map(str, labels)), codes, time, x, y, path, length=length, kind=kinds, dropped=lost, **given,
+        recording=list(rows["recording"]) if "recording" in rows else None, is_believed=is_played or is_log,
+    )  # fmt: skip
+    require_row_step(tracks.step, path)
+    ahead = BEHIND_MIDDLE[saved.reference] * tracks.length
+    x, y = tracks.x + ahead * np.cos(tracks.heading), tracks.y + ahead * np.sin(tracks.heading)
+    return replace(tracks, time=tracks.time - float(tracks.time.min()), x=x, y=y, is_reference=is_played)
+
+
+STATED = ("heading", "speed", "length", "width", "rear")
+
+
+def tracks_of_rows(
+    names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray, path: Path, *,
+    heading: FloatArray | None = None, speed: FloatArray | None = None, recording: Sequence[str] | None = None,
+    step: float | None = None, dropped: Mapping[str, int] = MappingProxyType({}), is_believed: bool = True,
+    **columns: Any,
+) -> tuple[Tracks, IntArray]:  # fmt: skip
+    """Tracks of rows in file order, arrays of shape (n,), see `Tracks`, and which row each of theirs is: who is who is
+    asked here, for all formats.
+
+    Headings and speeds that are not there (NaN) are those of the way; unless they are believed, all have to agree with
+    it. Raises `FormatError`, `NotEnoughDataError`.
+    """
+    known = identify(names, vehicle, time, x, y, recording, path=path)
+    order, whose = known.rows, known.vehicle
+    time, x, y = (values[order] for values in (time, x, y))
+    if not (same := whose[1:] == whose[:-1]).any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
-    step = float(np.median(np.diff(time)[same]))
-    require_row_step(step, path)
-
-    def stated(name: str, otherwise: FloatArray) -> FloatArray:
-        values = rows[name].to_numpy(dtype=np.float64) if name in rows else otherwise
-        return np.where(np.isfinite(values), values, otherwise)
-
-    way, driven = travel_heading(x, y, vehicle, time, step), ground_speed(x, y, vehicle, time, step)
-    heading, speed = stated("heading", way), np.abs(stated("speed", driven))
-    if not is_played and not is_log:  # a player's vehicles may drive backwards; its units are known
+    step = float(np.median(np.diff(time)[same])) if step is None else step
+    way, driven = travel_heading(x, y, whose, time, step), ground_speed(x, y, whose, time, step)
+    heading, speed = (
+        otherwise if values is None else np.where(np.isfinite(values[order]), values[order], otherwise)
+        for values, otherwise in ((heading, way), (speed, driven))
+    )
+    speed = np.abs(speed)
+    if not is_believed:
         require_headings(heading, way, driven, path)
         _require_speed(speed, driven, path)
-    kinds = np.full(len(rows), "")
-    if "vehicle_class" in rows:
-        kinds = rows["vehicle_class"].to_numpy(dtype=str)
-    length = stated("length", np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds]))
-    ahead = BEHIND_MIDDLE[saved.reference] * length
-    when, place = (time - float(time.min()), step), (x + ahead * np.cos(heading), y + ahead * np.sin(heading), heading)
-    width = rows["width"].to_numpy(dtype=np.float64) if "width" in rows else None
-    rear = stated("rear", np.zeros(len(rows))) if "rear" in rows else None
-    return Tracks(
-        names, vehicle, *when, *place, speed, length, kinds, width, is_played, rear, recording=known.recording,
-        recordings=known.recordings, dropped={**lost, **known.dropped}, notes=known.notes,
+    columns = {name: values[order] for name, values in columns.items()}
+    tracks = Tracks(
+        known.names, whose, time, step, x, y, heading, speed, recording=known.recording, recordings=known.recordings,
+        dropped={**dropped, **known.dropped}, notes=known.notes, **columns,
     )  # fmt: skip
+    return tracks, order
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
@@ -224,15 +239,15 @@ def _columns(
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_name = standard_sources(table.columns, HEADERS, path)
     columns: dict[str, pd.Series] = {}
-    read, table = len(table), chosen_rows(table, saved.missing, saved.rows, path)
+    clock = mapping.get("time", by_name.get("time", ColumnSource("time"))).column
+    read, table = len(table), chosen_rows(table, saved.missing, saved.rows, path, clock)
     for name in HEADERS:
         source = mapping.get(name, by_name.get(name))
         if source is None or source.column not in table.columns:
             if name in mapping or name in ("vehicle", "time", "x", "y"):
                 what = f"no column {repr(name) if source is None else source.column}"
-                counts = [str(header) for header in table.columns if plain_header(str(header)) in FRAMES]
-                advice = f"{counts[0]}:1/25 s, where its rate is 25/s" if name == "time" and counts else "COLUMN"
-                what = f"{what}; there are {listed(table.columns)} (translate with --map {name}={advice})"
+                advice = no_time(table.columns if name == "time" else (), f"--map {name}=COLUMN")
+                what = f"{what}; there are {listed(table.columns)} (translate with {advice})"
                 raise FormatError(what, path=path, line=1)
             continue
         column = table[source.column]

@@ -1,0 +1,1 @@
+"""Evidence for an assessor: claims, what tests them, and what they are tested to be here."""

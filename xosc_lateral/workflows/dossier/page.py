@@ -1,0 +1,67 @@
+"""The dossier as a page: each part with the clauses that it answers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone, inline
+from xosc_lateral.workflows.dossier.claims import Contents, Finding, State
+
+if TYPE_CHECKING:
+    from xosc_lateral.workflows.dossier.call import Dossier
+
+TITLES = {
+    "validity": "Validity by frequency, speed, lane width, road",
+    "data": "Data, licence, uncertainty",
+    "verdict": "How much a verdict may change",
+}
+"""Parts that are tables of two columns."""
+
+_COLOURS = {State.HOLDS: "#1a7f37", State.BROKEN: "#c62828", State.STATED: "#8a6d00", State.UNTESTED: "#8a6d00"}
+
+
+def dossier_page(dossier: Dossier, contents: Contents) -> str:
+    """HTML; the same dossier, the same bytes."""
+    from xosc_lateral.workflows.dossier.call import known_anomalies
+
+    page = Page(f"Dossier: {dossier.kind} {dossier.subject}")
+    page.lead(contents.purpose)
+    counts = {state: sum(finding.state is state for finding in dossier.findings) for state in State}
+    tones: dict[State, Tone] = {State.BROKEN: "bad"} if counts[State.BROKEN] else {State.HOLDS: "good"}
+    page.key_figures(KeyFigure(count, str(state), tone=tones.get(state, "")) for state, count in counts.items())
+    for finding in dossier.broken:
+        page.warning(f"Broken claim: {finding.claim.words}")
+
+    def begin(part: str, title: str) -> None:
+        page.section(title, f"Answers: {'; '.join(contents.clauses.get(part, ['no clause']))}.")
+
+    begin("purpose", "Purpose and scope")
+    page.text(contents.purpose)
+    begin("claims", "Claims, and what shows them")
+    page.table([_claim_row(finding) for finding in dossier.findings])
+    for part, title in TITLES.items():
+        begin(part, title)
+        page.table([{"": name, "what is known": words} for name, words in dossier.parts[part]])
+    begin("anomalies", "Known anomalies")
+    page.items(known_anomalies())
+    begin("tool", "Tool classification, as proposed")
+    page.text(
+        "Impact, detection and confidence level follow from your own use: those below hold where the check that is "
+        "named is part of it, and its result is looked at."
+    )
+    page.table(contents.tool)
+    begin("versions", "Versions and hashes")
+    page.table([{"": name, "version": words} for name, words in dossier.versions.items()])
+    return page.html({"subject": dossier.subject, "versions": dict(dossier.versions)})
+
+
+def _claim_row(finding: Finding) -> dict[str, object]:
+    claim, value = finding.claim, finding.value
+    return {
+        "claim": claim.words,
+        "state": Html(f'<strong style="color:{_COLOURS[finding.state]}">{inline(finding.state)}</strong>'),
+        "figure": None if value is None else f"{value:.3g} {claim.unit}",
+        "bound": claim.bound,
+        "from": finding.origin,
+        "test": f"`{claim.test}`" if claim.test else "none",
+    }

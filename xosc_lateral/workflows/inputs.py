@@ -1,0 +1,152 @@
+"""What stands for a scenario and its files: paths, or what a pipeline has in memory."""
+
+from __future__ import annotations
+
+import html
+import os
+import posixpath
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+from typing import IO, Any, TypeAlias
+from xml.etree import ElementTree
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import FILE_SIZE
+from xosc_lateral.files.held import Held, hold
+from xosc_lateral.files.source import read_source
+
+DocumentLike: TypeAlias = Any
+"""A path or URL; bytes, XML text, a file-like object, a parsed tree, a scenariogeneration object."""
+RoadLike: TypeAlias = Any
+"""The road; or roads and catalogs by their names as seen from the scenario."""
+
+_KINDS = "a path, bytes, XML text, a file-like object, an lxml tree or a scenariogeneration object"
+_URL = re.compile(r"[a-z][a-z0-9+.-]+://")
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_LOGIC_FILE = re.compile(rb"<LogicFile\s[^>]*?filepath\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_ENCODING = re.compile(r"\A(\s*<\?xml[^>]*?)\s+encoding\s*=\s*[\"'](?!utf-?8[\"'])[^\"']*[\"']", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ScenarioInput:
+    """A scenario to read, and its road if not where the scenario says; `held`: what of it is in memory."""
+
+    path: Path
+    road: Path | None
+    held: Held | None = None
+
+
+def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: str = "scenario") -> ScenarioInput:
+    """Paths of a scenario and its road, of files in memory where it is not on a disk; `name`: one without a name.
+
+    Raises `TypeError`: neither can be that; `FormatError`: scenariogeneration can't write its object, or no such file.
+    """
+    in_memory = _document(scenario, "scenario")
+    of_road = None if road is None or isinstance(road, Mapping) else _document(road, "road")
+    if in_memory is None and not isinstance(road, Mapping) and of_road is None:
+        return ScenarioInput(Path(scenario), None if road is None else Path(road))
+    if in_memory is None:
+        path = Path(scenario)
+        name, data = path.name, read_source(path).data
+    else:
+        stated = scenario if is_url(scenario) else getattr(scenario, "name", "") if hasattr(scenario, "read") else ""
+        name, data = (Path(stated).name if isinstance(stated, str) else "") or f"{name}.xosc", in_memory
+    files, road_name = {name: data}, None
+    if road is None and is_url(scenario) and (written := _road_in(data)):
+        files[written] = _fetched(urljoin(str(scenario), written))
+    if isinstance(road, Mapping):
+        files |= {str(key): _bytes(value, f"road[{key!r}]") for key, value in road.items()}
+    elif road is not None:
+        written = _road_in(data)
+        road_name = None if written and written != name else "road.xodr"
+        files[road_name or written] = _bytes(road, "road") if of_road is None else of_road
+    held = hold(files)
+    return ScenarioInput(held.folder / name, None if road_name is None else held.folder / road_name, held)
+
+
+def several(stated: Any) -> list[Any]:
+    """One of them, or several."""
+    is_list = isinstance(stated, Sequence) and not isinstance(stated, str | bytes | bytearray | memoryview)
+    return list(stated) if is_list and not ElementTree.iselement(stated) else [stated]
+
+
+def is_url(stated: object) -> bool:
+    """Whether it is a place that fsspec knows: ``s3://bucket/cut-in.xosc``, ``memory://a``."""
+    return isinstance(stated, str) and _URL.match(stated) is not None
+
+
+def open_url(url: str, mode: str) -> AbstractContextManager[IO[bytes]]:
+    """Open a file in a bucket or the like. Raises `FormatError`: what that needs is not installed."""
+    try:
+        import fsspec
+
+        opened: AbstractContextManager[IO[bytes]] = fsspec.open(url, mode)
+    except (ImportError, ValueError) as error:
+        raise FormatError(
+            f"can't be opened: {error} (pip install fsspec, and its package for this place)", path=url
+        ) from error
+    return opened
+
+
+def _fetched(url: str) -> bytes:
+    with open_url(url, "rb") as file:
+        data = file.read(FILE_SIZE.bytes + 1)
+    if len(data) > FILE_SIZE.bytes:
+        raise FormatError(FILE_SIZE.refusal(len(data) / 1e6), path=url)
+    return data
+
+
+def urljoin(base: str, written: str) -> str:
+    """Where a reference leads to, as seen from the file at a URL."""
+    scheme, _, path = base.partition("://")
+    return f"{scheme}://{posixpath.normpath(posixpath.join(posixpath.dirname(path), written))}"
+
+
+def _bytes(stated: Any, what: str) -> bytes:
+    data = _document(stated, what)
+    return read_source(stated).data if data is None else data
+
+
+def _document(stated: Any, what: str) -> bytes | None:
+    """Bytes of a file; None for a path."""
+    if isinstance(stated, bytes | bytearray | memoryview):
+        return bytes(stated)
+    if isinstance(stated, str) and stated.lstrip("\ufeff \t\r\n").startswith("<"):
+        return _encoded(stated)
+    if is_url(stated):
+        return _fetched(stated)
+    if isinstance(stated, str | os.PathLike):
+        return None
+    if hasattr(stated, "read"):
+        content = stated.read()
+        return _encoded(content) if isinstance(content, str) else bytes(content)
+    if hasattr(stated, "get_element"):
+        try:
+            stated = stated.get_element()
+        except Exception as error:  # whatever it finds missing
+            raise FormatError(f"{what}: scenariogeneration can't write it: {error or type(error).__name__}") from error
+    if type(stated).__module__.startswith("lxml."):
+        from lxml import etree
+
+        return bytes(etree.tostring(stated, encoding="utf-8", xml_declaration=True, with_tail=False))
+    root = stated.getroot() if hasattr(stated, "getroot") else stated
+    if ElementTree.iselement(root):
+        return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
+    raise TypeError(f"{what}: expected {_KINDS}, not {type(stated).__name__}")
+
+
+def _encoded(text: str) -> bytes:
+    """XML text in UTF-8, whatever it says it was in."""
+    return _ENCODING.sub(r"\1", text.removeprefix("\ufeff"), count=1).encode()
+
+
+def _road_in(scenario: bytes) -> str:
+    """The road's name as a scenario says it; empty: it says none, or one that holds on one machine alone."""
+    match = _LOGIC_FILE.search(_COMMENT.sub(b"", scenario))
+    written = "" if match is None else html.unescape((match[1] or match[2] or b"").decode(errors="replace")).strip()
+    name = PureWindowsPath(written)
+    usable = bool(name.suffix) and not (name.is_absolute() or name.drive or name.root) and "$" not in written
+    return written if usable else ""
