@@ -30,6 +30,7 @@ from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
+from xosc_lateral.workflows.conversion.user_player import told_by_player
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.inputs import DocumentLike, is_url, open_url, scenario_input
 from xosc_lateral.workflows.options import spelled_out
@@ -211,8 +212,16 @@ def check(plan: Plan, written: Written) -> Written:
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warnings = tuple(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
-    return replace(best, movement=movement, shifts=kept.shifts, warnings=warnings, trial_contacts=kept.trial_contacts)
+    warnings = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    if settings.player_library is not None:
+        warnings += told_by_player(
+            settings.player_library, plan.source, (plan.output, best.file.data or b""), source_meaning.runs,
+            plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
+            allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
+        )  # fmt: skip
+    return replace(
+        best, movement=movement, shifts=kept.shifts, warnings=tuple(warnings), trial_contacts=kept.trial_contacts
+    )
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:

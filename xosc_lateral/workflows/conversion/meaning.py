@@ -125,6 +125,11 @@ class Meaning:
         self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
 
     @property
+    def runs(self) -> Iterator[tuple[str, NominalMotion]]:
+        """Of the source: how vehicles under test drive, and what is played then."""
+        return zip((NOMINAL_RUN, *OTHER_RUNS), (motion for _, motion in self._before), strict=False)
+
+    @property
     def end(self) -> float:
         """Of the longest run, that under a braking ego aside. [s]"""
         return max(motion.end_time for _, motion in self._before[:3])
@@ -270,7 +275,7 @@ class KeptMeaning:
             if name not in unmoved:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
-                yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+                yield f"offsets of '{name}' are {size}{where}: {CHANGES}"
         for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
