@@ -68,6 +68,8 @@ def fit(
     )] = PRIOR_PROFILE,
     maneuvers: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="RECORDING",
         help="Recording whose lane changes the profile holds too: what `reconstruct` reads.")] = None,
+    road: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="FILE",
+        help="Road of that recording, where it holds none: OpenDRIVE, or SUMO's network.")] = None,
     library: Paths = (),
 ) -> DriverProfile:  # fmt: skip
     """Fit a driver profile.
@@ -125,7 +127,7 @@ def fit(
         from xosc_lateral.workflows.recordings.maneuvers import read_maneuvers
 
         recording = Path(maneuvers)
-        profile = replace(profile, maneuvers=read_maneuvers(recording))
+        profile = replace(profile, maneuvers=read_maneuvers(recording, None if road is None else Path(road)))
         inputs = {**profile.provenance.inputs, **parsed_hashes([recording])}
         profile = replace(profile, provenance=replace(profile.provenance, inputs=inputs))
     return replace(profile, left_hand=left_hand)

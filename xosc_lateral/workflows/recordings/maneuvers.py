@@ -22,9 +22,9 @@ BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""
 
 
-def read_maneuvers(recording: Path) -> Maneuvers:
+def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     """Maneuver profile of a recording; raises `FormatError`, `NotEnoughDataError`."""
-    traffic = read_recording(recording)
+    traffic = read_recording(recording, road=road)
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
