@@ -3,7 +3,8 @@
     python -m laboratory.driven_ego SCENARIO_OR_FOLDER... --library libesminiLib.so [--made] [--csv FILE]
 
 Each scenario that has an entity `Ego` is converted with `--ego Ego`; source and output are played with frames of
-0.01 s, while `Ego` stays in its lane and drives, from 1 s on, at 0.8, 1 and 1.2 of its initial speed. `--made` adds the
+0.01 s, while `Ego` drives, from 1 s on, at 0.7, 1 and 1.3 of its initial speed; brakes to a stop at 5 s and goes on 2 s
+later ("stops"); or goes to the next lane within 4 s at 5 s ("changes"), and back 10 s later. `--made` adds the
 scenarios of `tests.kit.made.reactive`; a file of parameter distributions stands for its first, middle and last
 set. Per scenario and speed:
 
@@ -13,6 +14,8 @@ set. Per scenario and speed:
 - moves: the smallest share of a car's road-following time (above 40 km/h, none of its own lateral actions) within
   `WINDOW` of which its place in the lane changes by more than `MOVED`.
 - contacts: steps in which cars touch that do not in the source.
+- along: how far along the lane a car is from where it is in the source, where no event is late. [m]
+- slow: by how much it is turned against the source, below 2 m/s. [mrad]
 """
 
 from __future__ import annotations
@@ -38,7 +41,13 @@ from laboratory.player_outputs import LATERAL, OURS, actions
 from tests.kit.made.reactive import reactive_scenarios
 from xosc_lateral.base.segment import MINIMUM_SPEED
 
-FACTORS = (0.8, 1.0, 1.2)
+EGOS: tuple[str, ...] = ("0.7", "1.0", "1.3", "stops", "changes")
+BRAKING, GOING = 5.0, 3.0
+"""Of an ego that stops, and goes on. [m/s2]"""
+START, STANDS, CROSSING, STAYS = 5.0, 2.0, 4.0, 10.0
+"""When it does something else, how long it stands, is on its way to the next lane, and stays there. [s]"""
+SLOW, ALONG = 2.0, 0.05
+"""[m/s], [m]"""
 WINDOW = 1.0
 """In which somebody who drives is seen to move. [s]"""
 MOVED = 0.001
@@ -73,7 +82,25 @@ class _State(ctypes.Structure):
     )
 
 
-def drive(library: str, scenario: str, factor: float, seconds: float) -> dict[str, Any]:
+def wanted_speed(ego: str, first: float, time: float) -> tuple[float, float]:
+    """Speed to drive at and how fast to change to it. [m/s], [m/s2]"""
+    if ego == "changes" or time <= 1.0:
+        return first, GOING
+    if ego != "stops":
+        return float(ego) * first, GOING
+    over = START + first / BRAKING + STANDS
+    return (0.0, BRAKING) if START <= time < over else (first, GOING)
+
+
+def crossed(ego: str, time: float) -> float:
+    """Share of the way to the next lane. [-]"""
+    if ego != "changes":
+        return 0.0
+    there, back = ((time - start) / CROSSING for start in (START, START + CROSSING + STAYS))
+    return float(0.5 * (np.cos(np.pi * np.clip(back, 0.0, 1.0)) - np.cos(np.pi * np.clip(there, 0.0, 1.0))))
+
+
+def drive(library: str, scenario: str, ego_drives: str, seconds: float) -> dict[str, Any]:
     """Play in this process, which can be done once."""
     se = ctypes.CDLL(library)
     se.SE_StepDT.argtypes = [ctypes.c_double]
@@ -106,14 +133,25 @@ def drive(library: str, scenario: str, factor: float, seconds: float) -> dict[st
     se.SE_ReportObjectRoadPos(ego, road, lane, 0.0, s + 0.1)
     se.SE_GetObjectState(ego, ctypes.byref(one))
     along = 1.0 if (one.x - x) * np.cos(heading) + (one.y - y) * np.sin(heading) >= 0.0 else -1.0
+    lanes = []
+    for other in (lane + 1, lane - 1) if ego_drives == "changes" else ():
+        se.SE_ReportObjectRoadPos(ego, road, other, 0.0, s)
+        se.SE_GetObjectState(ego, ctypes.byref(one))
+        if one.lane == other and other * lane > 0:
+            lanes.append((other, float(np.cos(heading) * (one.y - y) - np.sin(heading) * (one.x - x))))
+    se.SE_ReportObjectRoadPos(ego, road, lane, 0.0, s)
     rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in names.values() if name != "Ego"}
     contacts: set[tuple[str, str]] = set()
     k = 0
     for k in range(int(seconds / STEP)):
-        if k * STEP > 1.0:
-            speed += max(-3.0 * STEP, min(3.0 * STEP, factor * first - speed))
+        target, rate = wanted_speed(ego_drives, first, k * STEP)
+        speed += max(-rate * STEP, min(rate * STEP, target - speed))
         s += along * speed * STEP
-        se.SE_ReportObjectRoadPos(ego, road, lane, 0.0, s)
+        share = crossed(ego_drives, k * STEP) if lanes else 0.0
+        beside, across = lanes[0] if lanes else (lane, 0.0)
+        across *= along if lane < 0 else -along  # offsets count along t
+        place = (beside, (share - 1.0) * across) if share > 0.5 else (lane, share * across)
+        se.SE_ReportObjectRoadPos(ego, road, *place, s)
         se.SE_ReportObjectSpeed(ego, speed)
         se.SE_StepDT(STEP)
         if se.SE_GetQuitFlag() == 1:
@@ -130,12 +168,12 @@ def drive(library: str, scenario: str, factor: float, seconds: float) -> dict[st
     return {"rows": rows, "states": states, "contacts": sorted(contacts), "end": k * STEP}
 
 
-def driven(library: Path, scenario: Path, factor: float, seconds: float) -> Drive | None:
+def driven(library: Path, scenario: Path, ego: str, seconds: float) -> Drive | None:
     """Play in a process of its own; None where the player can't."""
     with tempfile.TemporaryDirectory() as folder:
         found = Path(folder) / "drive.json"
         # Forked: what is imported here needs no time there.
-        child = get_context("fork").Process(target=_drive, args=(library, scenario, factor, seconds, found))
+        child = get_context("fork").Process(target=_drive, args=(library, scenario, ego, seconds, found))
         child.start()
         child.join()
         played = json.loads(found.read_text()) if found.is_file() else {"refused": True}
@@ -149,10 +187,10 @@ def driven(library: Path, scenario: Path, factor: float, seconds: float) -> Driv
     return Drive(rows, states, {(a, b) for a, b in played["contacts"]}, played["end"])
 
 
-def _drive(library: Path, scenario: Path, factor: float, seconds: float, found: Path) -> None:
+def _drive(library: Path, scenario: Path, ego: str, seconds: float, found: Path) -> None:
     os.chdir(found.parent)  # the player writes files where it is
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    found.write_text(json.dumps(drive(str(library), str(scenario), factor, seconds)))
+    found.write_text(json.dumps(drive(str(library), str(scenario), ego, seconds)))
 
 
 @dataclass(slots=True)
@@ -160,12 +198,14 @@ class Measured:
     """One scenario under one ego, or why it is apart."""
 
     scenario: str
-    factor: float
+    ego: str
     late_s: float = 0.0
     lost: int = 0
     kick_mrad: float = 0.0
     moves: float = 1.0
     contacts: int = 0
+    along_m: float = 0.0
+    slow_mrad: float = 0.0
     what: list[str] = field(default_factory=list)
     apart: str = ""
 
@@ -174,7 +214,8 @@ class Measured:
         if self.apart:
             return f"{self.scenario[:52]:52} {self.apart}"
         numbers = f"{self.late_s:6.3f} s {self.lost:3d} lost {self.kick_mrad:6.2f} mrad {self.moves:5.2f} moves"
-        return f"{self.scenario[:52]:52} {self.factor:3.1f} {numbers} {self.contacts} contacts {'; '.join(self.what)}"
+        more = f"{self.contacts} contacts {self.along_m:5.3f} m {self.slow_mrad:5.1f} mrad slow"
+        return f"{self.scenario[:52]:52} {self.ego:7} {numbers} {more} {'; '.join(self.what)}"
 
 
 def lateral_spans(scenario: Path, played: Drive, parameters: Mapping[str, str]) -> dict[str, list[Span]]:
@@ -257,6 +298,14 @@ def compare(
             result.kick_mrad = 1e3 * float(turn[worst])
             if result.kick_mrad > KICK:
                 result.what.append(f"kick of {name} {result.kick_mrad:.2f} at {time[worst]:.2f} s")
+        n = min(len(old), len(rows))
+        plain, lively = old.iloc[:n], rows.iloc[:n]
+        dx, dy, heading = lively["x"] - plain["x"], lively["y"] - plain["y"], plain["h"]
+        ahead = dx * np.cos(heading) + dy * np.sin(heading)
+        turned = np.abs(np.angle(np.exp(1j * (lively["h"] - heading))))
+        slow = (plain["speed"] < SLOW) & (lively["speed"] < SLOW)
+        result.along_m = max(result.along_m, float(ahead.abs().max()))
+        result.slow_mrad = max(result.slow_mrad, 1e3 * float(turned[slow.to_numpy()].max(initial=0.0)))
         share, total = moving_share(rows, spans.get(name, ()))
         if total > 1.0 and name not in exempt and share < result.moves:
             result.moves = share
@@ -272,15 +321,15 @@ def measure(
 ) -> Iterator[Measured]:
     """Convert one scenario, and compare it under all egos."""
     output = folder / f"{name.replace('/', '_')}.xosc"
-    if driven(options.library, source, 1.0, 0.1) is None:
-        yield Measured(name, 1.0, apart="not played by the player, or no Ego")
+    if driven(options.library, source, "1.0", 0.1) is None:
+        yield Measured(name, "1.0", apart="not played by the player, or no Ego")
         return
     try:
         made = xl.convert(
             source, output, ego=["Ego"], seed=options.seed, allow=options.allowed, force=True, mode=options.mode,
         )  # fmt: skip
     except xl.XoscLateralError as error:
-        yield Measured(name, 1.0, apart=f"refused: {' '.join(str(error).split())[-150:]}")
+        yield Measured(name, "1.0", apart=f"refused: {' '.join(str(error).split())[-150:]}")
         return
     said = [
         line for line in made.warnings if "stays as it is" in line or "with the offsets" in line or "times what" in line
@@ -293,9 +342,9 @@ def measure(
         for item in trees
         if item.find("{*}Pedestrian") is not None or item.find("{*}MiscObject") is not None
     }
-    for factor in options.factor or FACTORS:
-        before, after = (driven(options.library, one, factor, options.seconds) for one in (source, output))
-        result = Measured(name, factor, what=said if factor == (options.factor or FACTORS)[0] else [])
+    for ego in options.ego or EGOS:
+        before, after = (driven(options.library, one, ego, options.seconds) for one in (source, output))
+        result = Measured(name, ego, what=said if ego == (options.ego or EGOS)[0] else [])
         if before is None or after is None:
             result.apart = "the player can't play " + ("the source" if before is None else "the output")
         else:
@@ -329,7 +378,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--mode", default="auto")
     parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--factor", type=float, action="append")
+    parser.add_argument("--ego", action="append", help="a factor, stops or changes")
     parser.add_argument("--keep", type=Path, help="folder for the outputs")
     parser.add_argument("--csv", type=Path)
     options = parser.parse_args()
@@ -352,6 +401,8 @@ def main() -> None:
         "no kick above 1 mrad": table["kick_mrad"] <= KICK,
         "moves 90 % of the time": table["moves"] >= MOVES,
         "no new contact": table["contacts"] == 0,
+        "along the road within 5 cm": (table["along_m"] <= ALONG) | (table["late_s"] > STEP + 1e-9),
+        "below 2 m/s turned by at most 10 mrad": table["slow_mrad"] <= 10.0,
     }
     for title, kept in asked.items():
         whole = kept.groupby(table["scenario"]).all()

@@ -66,7 +66,7 @@ def offsets(path: Path, library: Path | None) -> FloatArray:
         entities = play_scenario(path).motion.entities
         tracks = [(one.time, one.offset) for one in entities if one.name != "Ego"]
     else:
-        rows = driven(library, path, 1.0, SECONDS)
+        rows = driven(library, path, "1.0", SECONDS)
         assert rows is not None, f"{path} is refused"
         frames = [frame for name, frame in sorted(rows.rows.items()) if name != "Ego"]
         tracks = [(frame.time.to_numpy(), frame.offset.to_numpy()) for frame in frames]

@@ -24,6 +24,7 @@ _HOME = {
     "plan_loop": "workflows.profiles.loop",
     "detect": "workflows.detection.call",
     "dossier": "workflows.dossier.call",
+    "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
@@ -32,6 +33,7 @@ _HOME = {
     "compare_profiles": "workflows.profiles.profiles",
     "list_templates": "workflows.playing.templates",
     "write_template": "workflows.playing.templates",
+    "vary": "workflows.playing.vary",
     "live_esmini": "workflows.live.call",
     "live_sumo": "workflows.live.call",
     "Traffic": "workflows.live.traffic",
@@ -45,6 +47,7 @@ _HOME = {
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
     "Conversion": "workflows.conversion.conversion",
+    "Variations": "workflows.playing.vary",
     "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
@@ -55,6 +58,7 @@ _HOME = {
     "Evaluation": "workflows.profiles.evaluate",
     "ClosedLoop": "workflows.profiles.loop",
     "LoopPlan": "workflows.profiles.loop",
+    "Health": "workflows.profiles.health",
     "Detection": "workflows.detection.detection",
     "Sight": "workflows.detection.sight",
     "Dossier": "workflows.dossier.call",
@@ -83,6 +87,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "plan_loop",
     "detect",
     "dossier",
+    "check",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -91,6 +96,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "compare_profiles",
     "list_templates",
     "write_template",
+    "vary",
     "live_esmini",
     "live_sumo",
     "Traffic",
@@ -114,8 +120,10 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Evaluation",
     "ClosedLoop",
     "LoopPlan",
+    "Health",
     "Detection",
     "Sight",
+    "Variations",
     "Dossier",
     "ImportedDrives",
     "XoscLateralError",
@@ -156,8 +164,10 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.live.traffic import Moment, Traffic
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
+    from xosc_lateral.workflows.playing.vary import Variations, vary
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample

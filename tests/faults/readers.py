@@ -240,7 +240,7 @@ def _mapping_files(folder: Path) -> Iterable[Path]:
 def _use_mapping(path: Path) -> None:
     mapping = read_mapping(path)
     sane([source.factor for source in mapping.columns.values()], -1e9, 1e9, "factor")
-    if mapping.separator == mapping.decimal or not set(mapping.roles.values()) <= {*map(str, Role)}:
+    if mapping.layout.separator == mapping.decimal or not set(mapping.roles.values()) <= {*map(str, Role)}:
         raise NonsenseError("a mapping that no table is read by")
 
 

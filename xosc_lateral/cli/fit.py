@@ -17,6 +17,30 @@ app = group_of_verbs()
 
 
 @command(
+    app, "check", VERBS["check"],
+    "check drives.csv.gz --report health.html", "check day.csv --write-mapping company.toml",
+)
+def check(
+    tables: Tables, *,
+    report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Write a page with figures.")] = None,
+    write_mapping: Annotated[str | None, typer.Option(metavar="FILE.toml",
+        help="Write the mapping that is proposed.")] = None,
+    options: Annotated[Options, xl.check],
+    reply: Written,
+) -> None:
+    """What tables of drives hold: columns, units, signs, gaps, sensor noise; what can be fitted, and what not."""
+    page, mapping = reply.claim(tables, page=(report, "health.html"), mapping=(write_mapping, "mapping.toml"))
+    health = xl.check(tables, **options)
+    if page is not None:
+        health.write_report(page, force=reply.force)
+    if mapping is not None:
+        health.write_mapping(mapping, force=reply.force)
+    reply.say(health)
+    if health.read is None:
+        raise typer.Exit(1)
+
+
+@command(
     app, "fit", VERBS["fit"],
     "fit drives.csv.gz -o mine.json", "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
     "fit smoothed.csv -o mine.json --valid-below 0.3",

@@ -105,6 +105,7 @@ def _add(
 
 
 _add("dlr-ht", "DLR Highway Traffic.", "import dlr-ht tasi-0.15.4-py3-none-any.whl -o drives.parquet")
+_add("dlr-ut", "DLR Urban Traffic.", "import dlr-ut tasi-0.15.4-py3-none-any.whl -o city.parquet")
 _add("levelx", "highD and exiD.", "import levelx highD/ -o highd.parquet")
 _add(
     "mf4", "ASAM MDF bus logs.",

@@ -6,6 +6,7 @@ import operator
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -47,6 +48,19 @@ def listed(columns: Iterable[object]) -> str:
     return ", ".join(names[:20]) + (f" and {len(names) - 20} more" if len(names) > 20 else "")
 
 
+# ---- how a text holds its table --------------------------------------------------------------------------------------
+class Stated(NamedTuple):
+    """What a mapping says of the layout; None: it is found out."""
+
+    separator: str | None = None
+    header: int | None = None  # line, counted from 1
+    units: int | None = None  # line
+    comment: str = "#"  # begins lines that are no data
+
+
+PLAIN = Stated()
+
+
 # ---- rows and values that count --------------------------------------------------------------------------------------
 def as_word(cell: object) -> str:
     """A cell as a text that can be compared: whole numbers without a point, in lower case."""
@@ -66,10 +80,16 @@ def parse_condition(text: str, path: Path) -> tuple[str, str, float | str]:
 
 
 def chosen_rows(
-    table: pd.DataFrame, missing: Sequence[float | str] | None, conditions: Sequence[str], path: Path
+    table: pd.DataFrame, missing: Sequence[float | str] | None, conditions: Sequence[str], path: Path, clock: str
 ) -> pd.DataFrame:
-    """The rows that fulfil all conditions, without what stands for no value; usual markers have to be named."""
-    marked = {name: _without_markers(table[name], missing, path) for name in table.columns}
+    """The rows that fulfil all conditions, without what stands for no value; usual markers have to be named.
+
+    `clock`: header of the times, which pass what may be a marker elsewhere.
+    """
+    marked = {
+        name: _without_markers(table[name], _beyond(table[name], missing) if name == clock else missing, path)
+        for name in table.columns
+    }
     marked = {name: column for name, column in marked.items() if column is not None}
     table = table.assign(**marked) if marked else table
     for condition in conditions:
@@ -83,6 +103,15 @@ def chosen_rows(
             raise FormatError(f"no row has {condition}", path=path, element="rows of the mapping")
         table = table[fulfilled]
     return table
+
+
+def _beyond(column: pd.Series, missing: Sequence[float | str] | None) -> Sequence[float | str] | None:
+    """Markers that are not amid a column's other values."""
+    if missing is None or not pd.api.types.is_numeric_dtype(column):
+        return missing
+    rest = column[~column.isin(missing)]
+    low, high = rest.min(), rest.max()
+    return [value for value in missing if isinstance(value, str) or not low <= value <= high]
 
 
 def _without_markers(column: pd.Series, missing: Sequence[float | str] | None, path: Path) -> pd.Series | None:
@@ -103,23 +132,27 @@ def _without_markers(column: pd.Series, missing: Sequence[float | str] | None, p
 
 def refuse_marker(values: FloatArray, name: str, path: Path) -> None:
     """Refuse a column of numbers with a usual marker for missing values that nobody has named."""
+    if (marker := usual_marker(values, name)) is not None:
+        what = f"{marker[0]:g} in {marker[1]}: if it stands for no value, the mapping needs missing = [{marker[0]:g}]"
+        raise FormatError(f"{what}, else missing = []", path=path, element=f"column {name!r}")
+
+
+def usual_marker(values: FloatArray, name: str) -> tuple[float, str] | None:
+    """A number of a column that is likely to stand for no value, and in how many rows it is."""
     known, count = np.unique(values[np.isfinite(values)], return_counts=True)
     if len(known) > LEAST_MARKERS and re.search(NAMES_OF_DISTANCES, name, re.IGNORECASE):
         usual = int(count.argmax())
         value = float(known[usual])
         is_full = value == 0.0 or (value.is_integer() and set(str(int(value))) == {"9"}) or value in FULL_BYTES
         if is_full and usual in (0, len(known) - 1) and count[usual] > MOST_ROWS * count.sum():
-            what = f"{value:g} in {100 * count[usual] / count.sum():.0f} % of the rows: if it stands for no value, the"
-            what = f"{what} mapping needs missing = [{value:g}], else missing = []"
-            raise FormatError(what, path=path, element=f"column {name!r}")
+            return value, f"{100 * count[usual] / count.sum():.0f} % of the rows"
     for k in (0, -1) if len(known) > 1 else ():
         size = abs(float(known[k]))
         nines = size >= 999.0 and size.is_integer() and set(str(int(size))) == {"9"}
         rest = np.abs(np.delete(known, k)).max()
         if (nines or size in USUAL_MARKERS) and count[k] >= LEAST_MARKERS and size > 2.0 * rest:
-            what = f"{known[k]:g} in {count[k]} rows: if it stands for no value, the mapping needs"
-            what = f"{what} missing = [{known[k]:g}], else missing = []"
-            raise FormatError(what, path=path, element=f"column {name!r}")
+            return float(known[k]), f"{count[k]} rows"
+    return None
 
 
 # ---- cells as numbers ------------------------------------------------------------------------------------------------
@@ -172,6 +205,18 @@ def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int
 
 
 # ---- times -----------------------------------------------------------------------------------------------------------
+FRAMES = ("frame", "frame_id", "frame_num", "frame_number", "timestep", "time_step")
+"""Headers of counts, whose rate is not in them."""
+
+
+def no_time(headers: Iterable[object], otherwise: str) -> str:
+    """How a table without a column of times is translated."""
+    counts = (str(header) for header in headers if re.sub(r"\W+", "_", str(header)).lower() in FRAMES)
+    count = next(counts, None)
+    return otherwise if count is None else f"--map time={count}:1/25 s, where its rate is 25/s"
+
+
+EPOCHS_BEGIN = 6.3e8  # 1990 [s since 1970]
 EPOCHS = {1.0: 1.0, 1e3: 1e-3, 1e6: 1e-6, 1e9: 1e-9}
 """Units in a second -> unit of clocks that count since 1970: recordings are from after 1990 and before 2100. [s]"""
 
@@ -180,7 +225,7 @@ def epoch_factor(time: FloatArray) -> float:
     """Factor to seconds of numbers that count since 1970, by their size; 1 where they don't. [s]"""
     known = time[np.isfinite(time)]
     middle = float(np.median(known)) if len(known) else 0.0
-    return next((unit for count, unit in EPOCHS.items() if 6.3e8 * count < middle < 4.1e9 * count), 1.0)
+    return next((unit for count, unit in EPOCHS.items() if EPOCHS_BEGIN * count < middle < 4.1e9 * count), 1.0)
 
 
 def require_row_step(step: float, path: Path) -> None:

@@ -34,6 +34,7 @@ from xosc_lateral.files.columns import (
     epoch_factor,
     indicators,
     listed,
+    no_time,
     numbers_of,
     plain_cells,
     seconds_of_stamps,
@@ -91,9 +92,18 @@ def drives_of_table(
     table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame", lost: Counter[str] | None = None
 ) -> list[Drive]:
     """Drives of a table that is in memory; `path` is what messages call it. Else see `read_drives`."""
-    path, table = Path(path), frame_of(table)
-    read, lost = len(table), Counter[str]() if lost is None else lost
-    table = translated(table, as_mapping(mapping), path)
+    try:
+        return _drives_of(frame_of(table), as_mapping(mapping), Path(path), Counter() if lost is None else lost)
+    except FormatError as error:
+        said = f"{error.element or ''} {error.what}"
+        if ("column" not in said and "--map" not in said) or not Path(path).suffix:
+            raise
+        what = f"{error.what}; all columns: xosc-lateral check {Path(path).name} --report PAGE.html"
+        raise FormatError(what, path=error.path, line=error.line, element=error.element) from error
+
+
+def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Counter[str]) -> list[Drive]:
+    read, table = len(table), translated(table, mapping, path)
     lost["not chosen"] += read - len(table)
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
@@ -101,7 +111,8 @@ def drives_of_table(
     for name in table.columns:
         columns |= {} if name in LABELS else _numeric_columns(name, table, path)
     if "time" not in columns:
-        what = f"no column 'time'; there are {listed(columns)} (translate with --map time=COLUMN)"
+        advice = no_time(table.columns, "--map time=COLUMN")
+        what = f"no column 'time'; there are {listed(columns)} (translate with {advice})"
         raise FormatError(what, path=path, line=1)
     if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
         needed = "needs distance_left and distance_right, or offset and lane_width"
@@ -133,7 +144,9 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
-    table = chosen_rows(table, mapping.missing, mapping.rows, path)
+    table = chosen_rows(
+        table, mapping.missing, mapping.rows, path, mapping.columns.get("time", ColumnSource("time")).column
+    )
     taken = {source.column for source in mapping.columns.values()} | mapping.columns.keys()
     free = [name for name in table.columns if name not in taken]
     usual = standard_sources(free, {name: usual for name, usual in STANDARD.items() if name not in taken}, path)

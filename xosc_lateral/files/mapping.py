@@ -1,6 +1,7 @@
 """What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
 
-A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), what the recording shows
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``; ``header`` and ``units``, the lines
+that hold them, counted from 1; ``comment``, which begins lines that are no data), what the recording shows
 (``valid_below`` in Hz, ``resolution`` in m), ``[columns]`` with a line per standard name, as in ``--map``,
 ``[values.NAME]`` with the number that each text of a column stands for (of `vehicle_class`: the class that a number
 stands for), ``[roles]``; besides, ``rows = ["quality >= 2"]``: which rows
@@ -27,7 +28,7 @@ from xosc_lateral.base.limits import ANY_CONTEXT
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.texts import composed
 from xosc_lateral.base.vehicle_classes import CLASSES, class_of
-from xosc_lateral.files.columns import as_word, parse_condition
+from xosc_lateral.files.columns import PLAIN, Stated, as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
 # Factors to SI. Degrees stay apart from radians only by their factor.
@@ -124,7 +125,8 @@ def factor(column: str, unit: str) -> float:
 RECORDED = ("valid_below", "resolution")  # what recordings show: driving below a frequency [Hz], offsets to a step [m]
 
 KEYS = (
-    "encoding", "separator", "decimal", *RECORDED, "columns", "values", "roles", "rows", "missing", "time_zone",
+    "encoding", "separator", "decimal", "header", "units", "comment", *RECORDED,
+    "columns", "values", "roles", "rows", "missing", "time_zone",
     "reference", "wheel_track",
 )  # fmt: skip
 
@@ -150,8 +152,8 @@ class TableMapping:
     values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     # roles: by standard name, where a column comes from ("road", say), for who asks what may be a cause
     roles: Mapping[str, str] = field(default_factory=dict)
-    encoding: str | None = None  # encoding, separator: of text files; None: found out
-    separator: str | None = None
+    encoding: str | None = None  # of text files; None: found out
+    layout: Stated = PLAIN
     decimal: str = "."
     classes: Mapping[str, str] = field(default_factory=dict)  # vehicle classes by what the table has for them
     rows: tuple[str, ...] = ()  # conditions that rows have to fulfil
@@ -270,7 +272,12 @@ def standard_sources(
 
 def read_mapping(path: Path) -> TableMapping:
     """Read a mapping's file. Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry."""
-    values = composed(read_toml(path, "no mapping in TOML and UTF-8"))
+    return mapping_of(read_toml(path, "no mapping in TOML and UTF-8"), path)
+
+
+def mapping_of(entries: Mapping[str, Any], path: Path) -> TableMapping:
+    """A mapping of a file's entries; raises as `read_mapping` does."""
+    values = composed(dict(entries))
     if unknown := values.keys() - set(KEYS):
         raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
     for key in ("columns", "values", "roles"):
@@ -295,7 +302,7 @@ def read_mapping(path: Path) -> TableMapping:
         values={name: _numbers(name, entry, path) for name, entry in values["values"].items()},
         roles={name: _role(entry, path, f"[roles] {name}") for name, entry in values["roles"].items()},
         encoding=values.get("encoding"),
-        separator=values.get("separator"),
+        layout=PLAIN._replace(**{name: values[name] for name in PLAIN._fields if name in values}),
         decimal=decimal,
         classes={
             str(number).strip().lower(): _text(entry, path, f"[values.vehicle_class] {number}")
@@ -315,7 +322,10 @@ def _is_number(entry: Any) -> bool:
 
 
 ENTRIES: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
-    **dict.fromkeys(("encoding", "separator"), ("a text", lambda entry: isinstance(entry, str) and entry != "")),
+    **dict.fromkeys(
+        ("encoding", "separator", "comment"), ("a text", lambda entry: isinstance(entry, str) and entry != "")
+    ),
+    **dict.fromkeys(("header", "units"), ("a line, from 1 on", lambda entry: type(entry) is int and entry > 0)),
     "decimal": (". or ,", lambda entry: entry in (".", ",")),
     **dict.fromkeys(("rows", "missing"), ("a list", lambda entry: isinstance(entry, list))),
     "wheel_track": ("0 to 3 m", lambda entry: _is_number(entry) and 0.0 <= entry <= 3.0),

@@ -21,8 +21,8 @@ from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
 from xosc_lateral.files.apart import apart
-from xosc_lateral.files.columns import plain_cells
-from xosc_lateral.files.layout import HEAD_SIZE, Layout, layout_of, with_units
+from xosc_lateral.files.columns import PLAIN, Stated, plain_cells
+from xosc_lateral.files.layout import HEAD_SIZE, Layout, late_comments, layout_of, with_units
 from xosc_lateral.files.source import Source, open_source, parsed_hash
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 PARQUET = ".parquet"
 FEATHER = (".feather", ".arrow")
+TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 _CHUNK = 1 << 20
@@ -47,7 +48,7 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
     if mapping is None:
         return _read(path, low_memory=False)
-    return _read(path, mapping.encoding, mapping.separator, decimal=mapping.decimal, low_memory=False)
+    return _read(path, mapping.encoding, mapping.layout, decimal=mapping.decimal, low_memory=False)
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
@@ -56,7 +57,7 @@ def read_text_table(path: Path) -> pd.DataFrame:
     return as_text(table) if path.name.lower().endswith(PARQUET) else table
 
 
-def _read(path: Path, encoding: str | None = None, separator: str | None = None, **csv: Any) -> pd.DataFrame:
+def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv: Any) -> pd.DataFrame:
     if path.name.lower().endswith(PARQUET):
         with foreign_errors(path, "can't be read as a table"):
             table: pd.DataFrame = read_parquet(path).to_pandas()
@@ -71,10 +72,15 @@ def _read(path: Path, encoding: str | None = None, separator: str | None = None,
             read: pd.DataFrame = _feather(source.file).to_pandas()
             return frame_of(read).rename(columns=composed)
         text = _in_utf8(unpacked_text(source), path, encoding)
-        layout = Layout() if "dtype" in csv else layout_of(text.read(HEAD_SIZE), separator)
+        layout, skipped = Layout(), list[int]()
+        if "dtype" not in csv:
+            head = text.read(HEAD_SIZE)
+            layout = layout_of(head, stated)
+            skipped += layout.skipped
+            skipped += late_comments(text, layout.start, stated.comment) if len(head) == HEAD_SIZE else []
         text.seek(layout.start)
-        separator = separator or layout.separator or _separator(text, path, layout.start)
-        csv |= {"skiprows": list(layout.skipped)} if layout.skipped else {}
+        separator = layout.separator or _separator(text, path, layout.start)
+        csv |= {"skiprows": skipped} if skipped else {}
         table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
         table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
         table.columns = with_units(list(map(str, table.columns)), layout.units)
@@ -191,10 +197,17 @@ def frame_of(table: Any) -> pd.DataFrame:
     return table
 
 
-def text_encoding(path: Path) -> str:
-    """Encoding of a text file: UTF-8, or what `read_table` takes it for."""
-    with open_source(path) as source:
-        return "utf-8" if path.name.lower().endswith(".parquet") else _encoding(unpacked_text(source))
+def text_layout(path: Path, mapping: TableMapping) -> tuple[str, Layout] | None:
+    """Encoding and layout that `read_table` takes a text file to have; None of a table that is no text."""
+    if path.is_dir() or not path.name.lower().endswith(TEXT_SUFFIXES):
+        return None
+    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
+        packed = unpacked_text(source)
+        code = mapping.encoding or _encoding(packed)
+        text = _in_utf8(packed, path, code)
+        layout = layout_of(text.read(HEAD_SIZE), mapping.layout)
+        text.seek(layout.start)
+        return code, layout._replace(separator=layout.separator or _separator(text, path, layout.start))
 
 
 def _encoding(text: IO[bytes]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from examples.driver_simulator.plants import Plant
 from examples.driver_simulator.simulator import Driver, simulate_drive
 from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.fitting.models import autoregressive_fit
 from xosc_lateral.files.drives import read_drives
 
 
@@ -34,3 +35,12 @@ def driver_in(folder: Path) -> Callable[..., list[Drive]]:
 def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
     """Drives in a folder of the test's own."""
     return driver_in(tmp_path)
+
+
+@pytest.fixture(scope="package", autouse=True)
+def _coarse_fits() -> Iterator[None]:
+    """Base models are fitted with an eighth of the simulated snippets: chance moves their spreads by 2 %."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(autoregressive_fit, "SIMULATED_DRIVERS", autoregressive_fit.SIMULATED_DRIVERS // 8)
+        patched.setattr(autoregressive_fit, "FOR_EACH", autoregressive_fit.FOR_EACH // 8)
+        yield

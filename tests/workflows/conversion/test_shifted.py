@@ -65,7 +65,7 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     paths = [_path("A", None), _path("A", ("late",)), _path("B", None)]
 
-    def attempt(some: Sequence[OffsetPath]) -> tuple[None, list[Comparison]]:
+    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
         large = [one for one in some if one.entity == "A" and one.after is None and _largest(one) > 0.034]
         return None, [change if large else Comparison((), ())]
 
@@ -73,13 +73,13 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
     assert kept.changes == ()
     assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (0.25, False)}
-    assert "lane offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(()))
+    assert "offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(()))
 
 
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     paths = [_path("A", None), _path("B", None)]
-    _, kept = keep_meaning(paths, _nobody(), lambda _: (None, [change]))
+    _, kept = keep_meaning(paths, _nobody(), lambda *_: (None, [change]))
     assert kept.paths == tuple(paths) and kept.smaller == {}
     assert kept.changes == change.changes
 
@@ -95,7 +95,7 @@ def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
     ]
     tried: list[OffsetPath] = []
 
-    def attempt(some: list[OffsetPath]) -> tuple[None, list[Comparison]]:
+    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
         tried.extend(some)
         change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
         return None, [Comparison((), (change,) if len(tried) < 60 else ())]

@@ -371,7 +371,7 @@ def test_a_damaged_or_foreign_zip_is_refused(tmp_path, capsys):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("other.txt", "hello")
     assert main(["import", "dlr-ht", str(path), "-o", str(tmp_path / "t.parquet")]) == 1
-    assert "holds no DLR Highway Traffic trajectories" in capsys.readouterr().err
+    assert "holds no trajectories of DLR Highway Traffic" in capsys.readouterr().err
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("a/trajectories/trajectories_1.csv", "timestamp,id\n" * 1000)
     content = bytearray(path.read_bytes())

@@ -120,5 +120,10 @@ def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator,
 
 def in_another_order(values: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
     """Blocks of about a length, dealt in random order, shape (n,) like `values`."""
-    blocks = np.array_split(values, max(1, round(len(values) / length)))
-    return np.concatenate([blocks[index] for index in rng.permutation(len(blocks))])
+    count = max(1, round(len(values) / length))
+    lengths = np.full(count, len(values) // count)
+    lengths[: len(values) % count] += 1
+    order = rng.permutation(count)
+    dealt = lengths[order]
+    moved = (np.cumsum(lengths) - lengths)[order] - (np.cumsum(dealt) - dealt)  # each block, from where it comes to lie
+    return np.asarray(values[np.arange(len(values)) + np.repeat(moved, dealt)])

@@ -59,6 +59,9 @@ class JitKernel:
         return self._compiled
 
 
+CACHED = 16_000
+"""Numbers that stay in a processor's second cache while sums of them are added to. [-]"""
+
 WORTH_VECTORISING = 16
 """Recursions side by side from which on a step of all of them is one operation of numpy. [-]"""
 
@@ -153,11 +156,13 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
         result = np.empty(n)
         _convolve_compiled()(values.ravel(), kernel, result)
         return result.reshape(n, *values.shape[1:])
-    half = len(kernel) // 2
-    result = kernel[half] * values[half : half + n]
-    for k in range(half):
-        result += kernel[k] * (values[k : k + n] + values[len(kernel) - 1 - k :][:n])
-    return np.asarray(result)
+    half, rows = len(kernel) // 2, max(1, CACHED * len(values) // max(values.size, 1))
+    result = np.asarray(kernel[half] * values[half : half + n])
+    for first in range(0, n, rows):
+        part = result[first : first + rows]
+        for k in range(half):
+            part += kernel[k] * (values[first + k :][: len(part)] + values[first + len(kernel) - 1 - k :][: len(part)])
+    return result
 
 
 # ---- a curve through samples with continuous lateral speed and acceleration ----

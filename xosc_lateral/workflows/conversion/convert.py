@@ -30,6 +30,7 @@ from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
+from xosc_lateral.workflows.conversion.user_player import told_by_player
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.inputs import DocumentLike, is_url, open_url, scenario_input
 from xosc_lateral.workflows.options import spelled_out
@@ -194,7 +195,9 @@ def check(plan: Plan, written: Written) -> Written:
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
-    def attempt(paths: Sequence[OffsetPath]) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    def attempt(
+        paths: Sequence[OffsetPath], most: float
+    ) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
         trial = written
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
@@ -202,15 +205,23 @@ def check(plan: Plan, written: Written) -> Written:
         place = plan.source if held_at(plan.source) else plan.output
         output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = source_meaning.compare(
-            output, written.vehicles.trajectories, {path.entity for path in paths}
+            output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
         )
         return (trial, output, run), comparisons
 
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warnings = tuple(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
-    return replace(best, movement=movement, shifts=kept.shifts, warnings=warnings, trial_contacts=kept.trial_contacts)
+    warnings = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    if settings.player_library is not None:
+        warnings += told_by_player(
+            settings.player_library, plan.source, (plan.output, best.file.data or b""), source_meaning.runs,
+            plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
+            allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
+        )  # fmt: skip
+    return replace(
+        best, movement=movement, shifts=kept.shifts, warnings=tuple(warnings), trial_contacts=kept.trial_contacts
+    )
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:

@@ -125,6 +125,11 @@ class Meaning:
         self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
 
     @property
+    def runs(self) -> Iterator[tuple[str, NominalMotion]]:
+        """Of the source: how vehicles under test drive, and what is played then."""
+        return zip((NOMINAL_RUN, *OTHER_RUNS), (motion for _, motion in self._before), strict=False)
+
+    @property
     def end(self) -> float:
         """Of the longest run, that under a braking ego aside. [s]"""
         return max(motion.end_time for _, motion in self._before[:3])
@@ -153,18 +158,20 @@ class Meaning:
             yield driven, play(driven, self._played.network, step=step, time_limit=self.limit)
 
     def compare(
-        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str]
+        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, most: float = inf
     ) -> tuple[list[Comparison], NominalMotion]:
         """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
 
-        Each run with its own; and the nominal run of the output.
+        Each run with its own, as long as they differ in less than `most`; and the nominal run of the output.
         """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
-        comparisons, after = [], [run for _, run in self._runs(scenario)]
-        for (driven, before), run, name in zip(self._before, after, (NOMINAL_RUN, *OTHER_RUNS), strict=False):
+        comparisons, played = list[Comparison](), list[NominalMotion]()
+        runs = zip((NOMINAL_RUN, *OTHER_RUNS), self._before, self._runs(scenario), strict=False)  # played as asked for
+        for name, (driven, before), (_, run) in runs:
+            played.append(run)
             kept = (one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories)
             nominal = replace(before, actions=tuple(kept))
-            ends = run is after[0] or not gone  # else stories that others wait for may be gone
+            ends = name == NOMINAL_RUN or not gone  # else stories that others wait for may be gone
             comparison = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
             if comparison.changes:
                 key = name, frozenset(trajectories)
@@ -177,7 +184,9 @@ class Meaning:
             changes = tuple(structs.replace(one, run=name) for one in (*comparison.changes, *movement))
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
             comparisons.append(Comparison(shifts, changes, shares, name))
-        return comparisons, after[0]
+            if len(_changes(comparisons)) >= most:
+                break
+        return comparisons, played[0]
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
         """What a source itself does otherwise, and by how much, in other frames: two things that meet in one. [s]"""
@@ -266,7 +275,7 @@ class KeptMeaning:
             if name not in unmoved:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
-                yield f"lane offsets of '{name}' are {size}{where}: {CHANGES}"
+                yield f"offsets of '{name}' are {size}{where}: {CHANGES}"
         for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
@@ -289,9 +298,12 @@ class KeptMeaning:
 def keep_meaning(
     paths: Sequence[OffsetPath],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetPath]], tuple[Output, list[Comparison]]],
+    attempt: Callable[[Sequence[OffsetPath], float], tuple[Output, list[Comparison]]],
 ) -> tuple[Output, KeptMeaning]:
-    """Paths as large as leave what happens as it was, and the output with them; `attempt` writes some and plays."""
+    """Paths as large as leave what happens as it was, and the output with them.
+
+    `attempt` writes some and plays, until as much happens otherwise as it is told.
+    """
     sizes: Sizes = {}
     trials = 1
 
@@ -299,7 +311,7 @@ def keep_meaning(
         driven = [resized(path, some[k]) if k in some else path for k, path in enumerate(paths)]
         return [path for path in driven if path.pieces]
 
-    output, comparisons = attempt(paths)
+    output, comparisons = attempt(paths, inf)
     changes = _changes(comparisons)
     stuck = set[tuple[int, int]]()
     while changes and trials < MOST_TRIALS:
@@ -308,7 +320,7 @@ def keep_meaning(
             break
         for smaller in SIZES[SIZES.index(sizes.get(blamed, 1.0)) + 1 :]:
             trial = sizes | {blamed: smaller}
-            made, outcome = attempt(applied(trial))
+            made, outcome = attempt(applied(trial), len(changes))
             trials += 1
             if len(_changes(outcome)) < len(changes):
                 sizes, output, comparisons, changes = trial, made, outcome, _changes(outcome)

@@ -54,7 +54,7 @@ NOMINAL_RUN = "nominal"
 ROW_STEP = 0.1
 """Between rows that are drawn, and from which accelerations are taken. [s]"""
 
-MODE_WORDS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
+MODE_WORDS = {"trajectory": "a trajectory", "lane-offset": "paths beside its maneuvers"}
 """Modes of vehicles in words."""
 
 

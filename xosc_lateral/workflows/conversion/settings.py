@@ -66,6 +66,9 @@ class ConvertSettings:
         those whose motion depends on a vehicle under test.
     player : {"standard", "esmini", "carla"}
         Who is to play it: nobody in particular, or a player with ways of its own.
+    player_library : str or Path
+        Library of esmini 3, in which the check of a reactive output runs once more; what happens otherwise there is a
+        warning.
     version : str
         Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
         or left out and named in `Conversion.warnings`.
@@ -131,6 +134,10 @@ class ConvertSettings:
     player: Player = option(
         Player.STANDARD, say.one_of(Player), "--player", kind=Player, cell=say.as_it_is,
         help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
+    )
+    player_library: Path | None = option(
+        None, Path, "--player-library", kind=Path | None, decides=False, show_default=False,
+        help="libesminiLib.so or esminiLib.dll of esmini 3: the check of a reactive output runs in it, too.",
     )
     version: str | None = option(
         None, str, kind=str | None, metavar="1.0..1.4", cell=say.as_it_is, show_default=False,
@@ -240,6 +247,7 @@ class ConvertKeywords(TypedDict, total=False):
     library: Paths
     mode: Literal["auto", "trajectory", "lane-offset"]
     player: Literal["standard", "esmini", "carla"]
+    player_library: PathLike | None
     version: str | None
     allow: Paths
     road: RoadLike | None

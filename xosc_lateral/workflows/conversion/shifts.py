@@ -107,7 +107,7 @@ def compare_runs(
             (shift.unexplained_end, shift.end, "is over"),
         ):
             if abs(rest) > max(EVENT_TOLERANCE, before.step, after.step) + ROUNDING:
-                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {_later(moved)}", moved))
+                changes.setdefault(what, Change(what, key[1], action.start, f"{how} {later(moved)}", moved))
     for key, action in now.items():
         if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what = _named(key, action)
@@ -124,7 +124,8 @@ def compare_runs(
     return Comparison(tuple(event_shifts), tuple(changes.values()))
 
 
-def _later(moved: float) -> str:
+def later(moved: float) -> str:
+    """By how much, in words. [s]"""
     return f"{abs(moved):.2f} s {'later' if moved > 0 else 'earlier'}"
 
 
@@ -283,7 +284,7 @@ def _other_end(shifts: _Shifts, before: NominalMotion, after: NominalMotion) -> 
     moved = after.end_time - before.end_time
     if before.ended_by == after.ended_by and abs(shifts.of_end(moved)) > EVENT_TOLERANCE + max(before.step, after.step):
         what = f"the end ({before.ended_by}) at {before.end_time:.2f} s"
-        yield Change(what, None, before.end_time, f"comes {_later(moved)}", moved)
+        yield Change(what, None, before.end_time, f"comes {later(moved)}", moved)
 
 
 def _other_lanes(before: NominalMotion, after: NominalMotion, ignored: Collection[str]) -> Iterator[Change]:

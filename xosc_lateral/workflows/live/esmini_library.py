@@ -43,7 +43,11 @@ FUNCTIONS: dict[str, tuple[Any, ...]] = {
 }
 """What is called: type of the answer, types of the arguments."""
 
-OPTIONAL = {"SE_SetLogFilePath": (None, c.c_char_p), "SE_LogToConsole": (None, c.c_bool)}
+OPTIONAL: dict[str, tuple[Any, ...]] = {
+    "SE_SetLogFilePath": (None, c.c_char_p),
+    "SE_LogToConsole": (None, c.c_bool),
+    "SE_ReportObjectPosXYH": (c.c_int, c.c_int, c.c_double, c.c_double, c.c_double),
+}
 """What is called where it is there."""
 
 

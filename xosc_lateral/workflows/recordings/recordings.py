@@ -19,7 +19,7 @@ from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
 from xosc_lateral.workflows.recordings.cuts import require_along_lanes
-from xosc_lateral.workflows.recordings.importers import dlr_ht, levelx
+from xosc_lateral.workflows.recordings.importers import dlr_ht, dlr_ut, levelx
 from xosc_lateral.workflows.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.workflows.recordings.importers.tracks import LaneShape
@@ -107,7 +107,7 @@ def format_of(source: Path) -> str:
     """A recording's format by its name; a table, where nothing else fits."""
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
-        return "dlr-ht"
+        return "dlr-ut" if "urban" in name else "dlr-ht"
     if source.is_dir() or name.endswith("_tracks.csv"):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
@@ -318,6 +318,16 @@ def dlr_road(lanes: dlr_ht.Carriageways) -> WrittenRoad:
     return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
+def _dlr_ut(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    tracks, shapes, graph, _ = dlr_ut.read_streams(source)
+    made = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), "dlr-ut").encode()
+    note = "the road is that of the traffic: lanes are the mean paths of its vehicles, their width is assumed"
+    traffic = _on_road(tracks, source, road, made)
+    return replace(
+        traffic, name="dlr-ut", road_name="dlr-ut.xodr" if road is None else road.name, notes=(*traffic.notes, note)
+    )
+
+
 READERS: dict[str, Callable[[Path, Path | None, TableMapping], RecordedTraffic]] = {
-    "dlr-ht": _dlr, "levelx": _levelx, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
+    "dlr-ht": _dlr, "dlr-ut": _dlr_ut, "levelx": _levelx, "osi": _osi, "commonroad": _commonroad, "fcd": _fcd,
 }  # fmt: skip

@@ -33,7 +33,7 @@ class ReconstructSettings:
     # fmt: off
     format: str | None = option(
         None, str, kind=str | None, show_default=False,
-        help="dlr-ht, levelx, osi, commonroad, fcd, tracks; default: by the file.")
+        help="dlr-ht, dlr-ut, levelx, osi, commonroad, fcd, tracks; default: by the file.")
     road: Path | None = option(
         None, Path, kind=Path | None, show_default=False,
         help="OpenDRIVE file, or SUMO network, that it was recorded on.")

@@ -140,6 +140,7 @@ class Measure(Struct, frozen=True):
     system: CoordinateSystem
     kind: RelativeDistanceType
     freespace: bool = False
+    enough: float = inf  # beyond it, free space along roads need not be exact [m]
 
     @property
     def is_along_roads(self) -> bool:
@@ -172,6 +173,9 @@ class Measure(Struct, frozen=True):
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
         if overlap(state, other):
             return 0.0
+        away, sizes = apart(state, other.plane.x, other.plane.y), (_reach(state), _reach(other))
+        if self.kind is RelativeDistanceType.LONGITUDINAL and away > 2.0 * (self.enough + sum(sizes)):
+            return away  # no road bends so much that it is half as far along its reference line
         return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
@@ -265,6 +269,12 @@ Point = tuple[float, float]
 
 HEIGHT_APART = 2.5
 """Entities further apart than this in z are on different levels of the road: they don't touch. [m]"""
+
+
+def _reach(state: EntityState) -> float:
+    """No corner of its box is further from its reference point. [m]"""
+    box = state.entity.bounding_box
+    return hypot(0.5 * box.length + abs(box.center_x), 0.5 * box.width + abs(box.center_y))
 
 
 def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:

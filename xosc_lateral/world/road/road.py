@@ -236,6 +236,8 @@ def lane_at(
         score = (outside if prefer is None else round(outside, 9), lane.id != prefer, away, width)
         if best is None or score < best:
             best, nearest = score, (lane, centre)
+        if away < 0.5 * width - 1e-6:
+            break  # it holds t, and lanes do not overlap
     if best is None or nearest is None:
         return LaneCoordinates(index, 0, s, t, t, inf)
     lane, centre = nearest

@@ -41,6 +41,7 @@ Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 
 IMPORTERS = {
     "dlr-ht": ".dlr_ht:import_dlr_ht",
+    "dlr-ut": ".dlr_ut:import_dlr_ut",
     "levelx": ".levelx:import_levelx",
     "openacc": ".openacc:import_openacc",
     "mf4": ".mf4:import_mf4",
@@ -76,7 +77,7 @@ def import_drives(
     Parameters
     ----------
     format : str
-        "dlr-ht" (DLR Highway Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
+        "dlr-ht", "dlr-ut" (DLR Highway, Urban Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
         "tracks" (x, y on an OpenDRIVE road), "fcd" (SUMO), "commonroad" (extra `commonroad`),
         "osi" (ASAM OSI traces; extra `osi`), or a plug-in's.
     source : path or paths

@@ -23,6 +23,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -128,7 +129,9 @@ def read_tracks(source: Path) -> pd.DataFrame:
 
     `attrs["dropped"]`: rows of the files that are not in it, by reason.
     """
-    frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
+    frame = pd.concat(
+        [_read_csv(stream, source) for stream in files_of(source, "DLR-Highway-Traffic")], ignore_index=True
+    )
     try:
         stamps = pd.to_datetime(frame["timestamp"], utc=True)
     except ValueError as error:
@@ -146,7 +149,8 @@ def read_tracks(source: Path) -> pd.DataFrame:
     return frame
 
 
-def _trajectory_files(source: Path) -> list[io.BytesIO]:
+def files_of(source: Path, data_set: str, kind: str = "trajectories") -> list[io.BytesIO]:
+    """CSV files of a kind, out of a data set of the DLR: in a wheel of tasi, in its zip, or one by itself."""
     with open_source(source) as opened:
         if not zipfile.is_zipfile(opened.file):
             opened.file.seek(0)
@@ -154,16 +158,16 @@ def _trajectory_files(source: Path) -> list[io.BytesIO]:
         try:
             archive = zipfile.ZipFile(opened.file)
             opened.unpacked(sum(item.file_size for item in archive.infolist()))
-            inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+            inner = [name for name in archive.namelist() if data_set in name and name.endswith(".zip")]
             if inner:
                 archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
                 opened.unpacked(sum(item.file_size for item in archive.infolist()))
-            names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+            names = sorted(name for name in archive.namelist() if f"/{kind}/" in name and name.endswith(".csv"))
             files = [io.BytesIO(archive.read(name)) for name in names]
         except zipfile.BadZipFile as error:
             raise FormatError(f"damaged zip: {error}", path=source) from error
     if not files:
-        raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
+        raise FormatError(f"holds no {kind} of {data_set.replace('-', ' ')} ({kind}/*.csv)", path=source)
     return files
 
 
@@ -285,10 +289,10 @@ def _each(passage: IntArray, every: int) -> BoolArray:
     return np.asarray(position % every == 0)
 
 
-def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:
+def vehicle_classes(tracks: pd.DataFrame, classes: Sequence[str] = CLASSES) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
-    scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
-    return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
+    scores = tracks[[f"classifications_{name}" for name in classes]].to_numpy()
+    return np.asarray(np.array(classes)[scores.argmax(axis=1)])
 
 
 def _version(source: Path) -> str:

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,10 +17,10 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import TRUCKS, class_of
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.files.columns import comma_numbers
+from xosc_lateral.files.columns import EPOCHS_BEGIN, comma_numbers, no_time, usual_marker
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, factor, parts_of
-from xosc_lateral.files.tables import read_table, text_encoding
+from xosc_lateral.files.tables import read_table, text_layout
 from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, paths_of
 
@@ -109,13 +110,27 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
     return ImportedDrives(table, record)
 
 
-def propose_mapping(files: Sequence[Path]) -> str:
-    """TOML of a mapping of these tables, with what each line was guessed from."""
-    tables = [read_table(path).rename(columns=lambda name: str(name).strip()) for path in files]
+class Recognised(NamedTuple):
+    """A column of a table by its standard name, and what that was seen from."""
+
+    name: str
+    header: str
+    unit: str  # empty: none is stated, or seen by the size of the values
+    why: str
+    values: pd.Series
+
+    @property
+    def numbers(self) -> FloatArray:
+        """What is a number in it."""
+        return _numbers(self.values)
+
+
+def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recognised], list[str]]:
+    """Columns that all tables have, as their headers and values show them; and those that keep their names."""
+    tables = [table.rename(columns=lambda name: str(name).strip()) for table in tables]
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]
     if not shared:
-        raise FormatError("the tables have no column in common", path=files[-1])
-    values = {name: pd.concat([table[name] for table in tables], ignore_index=True) for name in shared}
+        raise FormatError("the tables have no column in common", path=path)
     headers: dict[str, str] = {}
     for header in shared:
         bare, _ = parts_of(header)
@@ -126,25 +141,54 @@ def propose_mapping(files: Sequence[Path]) -> str:
         name = next((name for name in (placed, *usual) if name is not None and name not in headers), None)
         if name is not None:
             headers[name] = header
-    needed = ("time",) if SIDES.keys() <= headers.keys() else ("time", "offset", "lane_width")
-    codes = sorted({text_encoding(path) for path in files} - {"utf-8"})
+    values = {header: pd.concat([table[header] for table in tables], ignore_index=True) for header in headers.values()}
+    found = [Recognised(name, header, *_unit_of(name, header, values[header]), values[header])
+             for name, header in headers.items()]  # fmt: skip
+    return found, [header for header in shared if header not in values]
+
+
+def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) -> str:
+    """TOML of a mapping of these tables, with what each line was guessed from; `mapping`: what is known."""
+    known = mapping or TableMapping()
+    found, left = recognised([read_table(path, known) for path in files], files[-1])
+    headers = {one.name for one in found}
+    needed = ("time",) if SIDES.keys() <= headers else ("time", "offset", "lane_width")
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
         '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
-        *(f"encoding = {_quoted(code)}" for code in codes[:1]),
+        *_text_lines(files, known, found),
         "",
         "[columns]",
-        *(_line(name, header, values[header]) for name, header in headers.items()),
-        *(f'# {name} = "?"  # needed, and not found' for name in needed if name not in headers),
+        *map(_line, found),
+        *(
+            f'# {name} = "?"  # needed, and not found; {no_time(left, "") if name == "time" else ""}'.rstrip("; ")
+            for name in needed
+            if name not in headers
+        ),
     ]
-    for name, header in headers.items():
-        if name != "drive" and not len(_numbers(values[header])):
-            lines += _texts(name, values[header])
-    left = [header for header in shared if header not in headers.values()]
+    for one in found:
+        if one.name != "drive" and not len(one.numbers):
+            lines += _texts(one.name, one.values)
     if left:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
     return "\n".join(lines)
+
+
+def _text_lines(files: Sequence[Path], known: TableMapping, found: Sequence[Recognised]) -> list[str]:
+    """How the tables are written, where that is not plain, and what stands for no value."""
+    seen = [seen for path in files if (seen := text_layout(path, known)) is not None]
+    codes, layouts = {code for code, _ in seen}, {layout[2:] for _, layout in seen}
+    lines = [f"encoding = {_quoted(code)}" for code in sorted(codes - {"utf-8"})[:1]]
+    if len(layouts) == 1 and (layout := seen[0][1]) and (layout.header > 1 or layout.units):
+        lines += [f"separator = {_quoted(layout.separator or ',')}", f"header = {layout.header}  # line"]
+        lines += [f"units = {layout.unit_row}  # line"] if layout.units else []
+    markers = {one.header: marker for one in found if (marker := usual_marker(one.numbers, one.header)) is not None}
+    if markers:
+        why = "; ".join(f"{value:g} in {rows} of {header}" for header, (value, rows) in markers.items())
+        numbers = ", ".join(f"{value:g}" for value in sorted({value for value, _ in markers.values()}))
+        lines.append(f"missing = [{numbers}]  # CHECK: {why}")
+    return lines
 
 
 def _place_named(bare: str) -> str | None:
@@ -162,27 +206,33 @@ def _place_named(bare: str) -> str | None:
     return "offset" if means_offset else None
 
 
-def _line(name: str, header: str, column: pd.Series) -> str:
+def _unit_of(name: str, header: str, column: pd.Series) -> tuple[str, str]:
+    """Unit of a column, and what it was seen from."""
     _, unit = parts_of(header)
-    why = "by its header"
     if unit:
         try:
             factor(name, unit)
-            why = "unit by its header"
+            return unit, "unit by its header"
         except ValueError:
-            unit = ""
-    numbers = _numbers(column)
-    if not unit and len(numbers):
-        size = float(np.median(np.abs(numbers)))
-        unit = next((unit for low, high, unit in BY_SIZE.get(name, ()) if low <= size < high), "")
-        if name == "time" and len(numbers) > 1 and 2.0 <= float(np.median(np.abs(np.diff(numbers)))) <= 1000.0:
-            unit = "ms"
-        why = "unit by the size of its values" if unit else why
+            pass
+    if not len(numbers := _numbers(column)):
+        return "", "by its header"
+    size = float(np.median(np.abs(numbers)))
+    unit = next((unit for low, high, unit in BY_SIZE.get(name, ()) if low <= size < high), "")
+    if name == "time" and float(np.median(numbers)) > EPOCHS_BEGIN:
+        return "", "counts since 1970, by its size"
+    if name == "time" and len(numbers) > 1:
+        unit = "ms" if 2.0 <= float(np.median(np.abs(np.diff(numbers)))) <= 1000.0 else unit
+    return unit, "unit by the size of its values" if unit else "by its header"
+
+
+def _line(one: Recognised) -> str:
+    numbers = one.numbers
     seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
-    sign = f"; CHECK: {SIGNS[name]}" if name in SIGNS else ""
-    source = f"{header}:{unit}" if unit else header
-    entry = f"{{column = {_quoted(header)}}}" if ":" in header and not unit else _quoted(source)
-    return f"{name} = {entry}  # {why}{seen}{sign}"
+    sign = f"; CHECK: {SIGNS[one.name]}" if one.name in SIGNS else ""
+    source = f"{one.header}:{one.unit}" if one.unit else one.header
+    entry = f"{{column = {_quoted(one.header)}}}" if ":" in one.header and not one.unit else _quoted(source)
+    return f"{one.name} = {entry}  # {one.why}{seen}{sign}"
 
 
 def _numbers(column: pd.Series) -> FloatArray:

@@ -23,17 +23,18 @@ from xosc_lateral.files.columns import (
     chosen_rows,
     epoch_factor,
     listed,
+    no_time,
     numbers_of,
     require_row_step,
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import (
     UNITS,
+    ColumnSource,
     MappingLike,
     TableMapping,
     as_mapping,
     parse_map,
-    plain_header,
     standard_sources,
 )
 from xosc_lateral.files.output_tables import RECOGNISED_BY
@@ -58,8 +59,6 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type", "vehicle_type", "object_category"),
 }
 """Name -> headers that are understood, as `plain_header` has them, the first that is there; others by the map."""
-
-FRAMES = ("frame", "frame_id", "frame_num", "frame_number", "timestep", "time_step")  # counts, of a rate not in them
 
 USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
 """Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
@@ -240,15 +239,15 @@ def _columns(
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_name = standard_sources(table.columns, HEADERS, path)
     columns: dict[str, pd.Series] = {}
-    read, table = len(table), chosen_rows(table, saved.missing, saved.rows, path)
+    clock = mapping.get("time", by_name.get("time", ColumnSource("time"))).column
+    read, table = len(table), chosen_rows(table, saved.missing, saved.rows, path, clock)
     for name in HEADERS:
         source = mapping.get(name, by_name.get(name))
         if source is None or source.column not in table.columns:
             if name in mapping or name in ("vehicle", "time", "x", "y"):
                 what = f"no column {repr(name) if source is None else source.column}"
-                counts = [str(header) for header in table.columns if plain_header(str(header)) in FRAMES]
-                advice = f"{counts[0]}:1/25 s, where its rate is 25/s" if name == "time" and counts else "COLUMN"
-                what = f"{what}; there are {listed(table.columns)} (translate with --map {name}={advice})"
+                advice = no_time(table.columns if name == "time" else (), f"--map {name}=COLUMN")
+                what = f"{what}; there are {listed(table.columns)} (translate with {advice})"
                 raise FormatError(what, path=path, line=1)
             continue
         column = table[source.column]

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from math import copysign, hypot
 
+from msgspec.structs import replace
+
 from xosc_lateral.world.player.distances import Measure, Spot, apart, free_road_gap, overlap, road_gap, spot_of
 from xosc_lateral.world.player.positions.resolve import pose_of, spot_at
 from xosc_lateral.world.player.simulation import Simulation, holds
@@ -64,7 +66,7 @@ def prepare_distance(content: conditions.DistanceCondition, simulation: Simulati
 def prepare_relative_distance(content: conditions.RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts. [m]"""
     other = simulation.entity(content.entity_ref, content.place)
-    measure = measure_of(content, simulation)
+    measure = replace(measure_of(content, simulation), enough=content.value)
     return lambda state: other.active and holds(_amount(measure, state, other), content.rule, content.value)
 
 

@@ -1,0 +1,231 @@
+"""`check`: what tables of drives hold, what of it is read and what is guessed, and what can be fitted to it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import DriverProfileError, FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
+from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
+from xosc_lateral.files.remote import inputs_of
+from xosc_lateral.files.tables import read_table
+from xosc_lateral.workflows.options import Paths, declare_options
+from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, as_paths, given_drives, write_page
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.model.profile import DriverProfile
+
+BESIDE = ("left_distance", "right_distance")
+
+
+@declare_options
+def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
+    """What tables of drives hold: columns, units, signs, gaps, sensor noise; what can be fitted, and what not.
+
+    Parameters
+    ----------
+    drives : path or paths
+        Tables, as `fit` reads them.
+    columns : mapping of str to str, TableMapping, or path, optional
+        See `read_drives`. Where the tables can't be read with it, what their headers and values suggest is tried.
+
+    Raises
+    ------
+    FormatError
+        Only where there is no table at all: what is wrong with one is part of the result.
+    """
+    from xosc_lateral.workflows.recordings.importers.foreign_table import propose_mapping, recognised
+
+    files, told = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
+    found, left = recognised([read_table(path, told) for path in files], files[-1])
+    proposal = propose_mapping(files, told)
+    guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))
+    mappings = [told, replace(guess, columns={**guess.columns, **told.columns}, roles=told.roles)]
+    wrong, read = list[str](), None
+    for mapping in mappings if mappings[0] != mappings[1] else mappings[:1]:
+        try:
+            read = given_drives(list(files), mapping)
+            break
+        except (FormatError, NotEnoughDataError) as error:
+            what = str(error.__cause__ or error)  # which does not advise to look here
+            wrong += [what] if what not in wrong else []
+    rows = [
+        {
+            "column": one.name, "in the table": one.header, "unit": told.columns[one.name].unit or "as it is"
+            if one.name in told.columns else one.unit or "as it is",
+            "seen": "by the mapping" if one.name in told.columns else one.why, **_range(one.numbers),
+            "empty [%]": round(100.0 * float(one.values.isna().mean()), 1),
+        }
+        for one in found
+    ]  # fmt: skip
+    profile, why = (None, "") if read is None else _fitted(read)
+    return Health(files, tuple(rows), tuple(left), read, bool(wrong) and read is not None, tuple(wrong),
+                  proposal, profile, why)  # fmt: skip
+
+
+def _range(numbers: FloatArray) -> dict[str, float | None]:
+    if not len(numbers):
+        return {"5 %": None, "median": None, "95 %": None}
+    low, middle, high = np.quantile(numbers, (0.05, 0.5, 0.95)).tolist()
+    return {"5 %": low, "median": middle, "95 %": high}
+
+
+def _fitted(read: GivenDrives) -> tuple[DriverProfile | None, str]:
+    """A profile of the drives, as far as there is enough of them; else why there is none."""
+    from xosc_lateral.workflows.profiles.fit import fit
+
+    try:
+        with catch_warnings():
+            simplefilter("ignore", UserWarning)
+            return fit(read.drives), ""
+    except (NotEnoughDataError, DriverProfileError) as error:
+        return None, str(error)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Health(Result):
+    """What tables of drives hold."""
+
+    files: tuple[Path, ...]
+    columns: tuple[Mapping[str, Any], ...]  # those recognised, with unit, where that was seen, and quantiles
+    others: tuple[str, ...]  # headers that keep their names
+    read: GivenDrives | None  # None: they can't be read as drives
+    is_guessed: bool  # whether what is proposed was needed to read them
+    wrong: tuple[str, ...]  # why they can't be read as they are
+    mapping: str  # TOML that is proposed
+    profile: DriverProfile | None  # None: none can be fitted, see `why`
+    why: str
+
+    @property
+    def drives(self) -> list[dict[str, Any]]:
+        """A row for each drive."""
+        return [_facts(drive) for drive in (self.read.drives if self.read else [])]
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Numbers of all drives together; empty where they can't be read."""
+        if self.read is None:
+            return {}
+        drives = self.read.drives
+        offset = np.concatenate([drive.offset for drive in drives])
+        rows = self.drives
+        return {
+            "drives": len(drives), "hours": sum(row["minutes"] for row in rows) / 60.0,
+            "road_following_h": sum(row["road-following [min]"] for row in rows) / 60.0,
+            "rows": len(offset), "left_out": dict(self.read.left_out),
+            "rate_hz": float(np.median([row["rate [Hz]"] for row in rows])),
+            "offset_mean_m": float(offset.mean()), "offset_sd_m": float(offset.std()),
+            "lane_width_m": float(np.median(np.concatenate([drive.lane_width for drive in drives]))),
+        }  # fmt: skip
+
+    def headline(self) -> str:
+        """One line."""
+        if self.read is None:
+            return f"can't be read as drives: {self.wrong[0]}"
+        known = self.figures
+        side = "left" if known["offset_mean_m"] > 0.0 else "right"
+        count = f"{known['drives']} drive{'s' if known['drives'] > 1 else ''}"
+        text = (
+            f"{count}, {known['road_following_h']:.2f} of {known['hours']:.2f} h road-following, "
+            f"{known['rate_hz']:.3g} Hz; {abs(known['offset_mean_m']):.2f} m {side} of the lane's centre on average, "
+            f"spread {known['offset_sd_m']:.2f} m, lanes {known['lane_width_m']:.2f} m wide"
+        )
+        return text + ("; as guessed: a mapping is needed" if self.is_guessed else "")
+
+    def can(self) -> list[str]:
+        """What can be fitted to the drives, a line each."""
+        if self.profile is None:
+            return []
+        from xosc_lateral.files.profiles import describe_profile
+
+        lines = [f"a profile, {line}" for line in describe_profile(self.profile).splitlines()[1:2]]
+        if self.profile.sensor is not None:
+            lines.append(self.profile.sensor.in_words())
+        if self.profile.effects:
+            lines.append(f"effects of {', '.join(self.profile.columns)}")
+        return lines
+
+    def cannot(self) -> list[str]:
+        """What can't, and why, a line each."""
+        if self.profile is None:
+            return [f"a profile: {self.why}"] if self.why else []
+        assert self.read is not None
+        from xosc_lateral.workflows.profiles.fit import fit_warnings
+
+        known = set[str]().union(*(drive.context for drive in self.read.drives))
+        lines = list(fit_warnings(self.profile))
+        if "speed" not in known:
+            lines.append("what speed does, and slow driving is not cut out: there is no column `speed`")
+        if not set(BESIDE) & known:
+            lines.append(f"what vehicles beside do: there is neither {' nor '.join(BESIDE)}")
+        if len(self.read.drives) < 2:
+            lines.append("how drivers differ: there is one drive")
+        return lines
+
+    def __str__(self) -> str:
+        names = [
+            f"  {row['column']} = {row['in the table']} [{row['unit']}]  {row['seen']}"
+            + ("" if row["median"] is None else f"; {row['5 %']:.4g} to {row['95 %']:.4g}") for row in self.columns
+        ]  # fmt: skip
+        left_out = [f"rows left out: {count} {why}" for why, count in self.figures.get("left_out", {}).items()]
+        return "\n".join(
+            [
+                self.headline(), *(f"wrong: {what}" for what in self.wrong[self.read is None :]), "columns:", *names,
+                *([f"  others: {', '.join(self.others)}"] if self.others else []), *left_out,
+                *(f"can be fitted: {line}" for line in self.can()),
+                *(f"can't be fitted: {line}" for line in self.cannot()),
+            ]
+        )  # fmt: skip
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each drive."""
+        return pd.DataFrame(self.drives)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {
+            "files": [str(path) for path in self.files], "can_be_read": self.read is not None,
+            "guessed": self.is_guessed, "wrong": list(self.wrong), "columns": list(map(dict, self.columns)),
+            "others": list(self.others),
+            "summary": self.figures, "drives": self.drives, "can": self.can(), "cannot": self.cannot(),
+            "mapping": self.mapping,
+        }  # fmt: skip
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page."""
+        from xosc_lateral.workflows.profiles.health_page import page_of
+
+        drives = self.read.drives if self.read else []
+        page = lambda: page_of(self.headline(), self.to_dict(), drives)  # noqa: E731
+        return write_page(path, "health.html", page, inputs=self.files, force=force)
+
+    def write_mapping(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the proposed mapping (``.toml``), for a person to correct."""
+        from xosc_lateral.files.atomic import write_atomically
+        from xosc_lateral.files.output_paths import claim, output_file
+
+        output = output_file(path, "mapping.toml", (".toml",))
+        claim([output], self.files, force=force)
+        return write_atomically(output, self.mapping)
+
+
+def _facts(drive: Drive) -> dict[str, Any]:
+    step = np.diff(drive.time)
+    gaps, speed = step[step > MAX_GAP], drive.speed
+    following = sum(float(run.time[-1] - run.time[0]) for run in cut_runs(drive))
+    return {
+        "drive": drive.name, "rows": len(drive), "minutes": float(drive.time[-1] - drive.time[0]) / 60.0,
+        "road-following [min]": following / 60.0, "rate [Hz]": 1.0 / float(np.median(step)), "gaps": len(gaps),
+        "longest gap [s]": float(gaps.max(initial=0.0)), "mean offset [m]": float(drive.offset.mean()),
+        "spread [m]": float(drive.offset.std()), "lane width [m]": float(np.median(drive.lane_width)),
+        "speed [km/h]": None if speed is None else 3.6 * float(np.nanmedian(speed)),
+    }  # fmt: skip

@@ -1,0 +1,84 @@
+"""The page of `check`: what tables of drives hold, finding first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.files.pages.chart import MEASURED
+from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import KeyFigure, Page
+from xosc_lateral.files.source import parsed_hashes
+
+BINS = 80
+NAMED_DRIVES = 50  # so many drives have a row of their own
+
+
+def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) -> str:
+    """HTML page, self-contained, of what `check` says and the drives that it read."""
+    files = [Path(file) for file in facts["files"]]
+    page = Page(f"What is in {files[0].name}" + (f" and {len(files) - 1} more" if len(files) > 1 else ""))
+    known = facts["summary"]
+    page.lead(f"{headline}.")
+    if known:
+        lost = sum(known["left_out"].values())
+        page.key_figures(
+            [
+                KeyFigure(f"{known['road_following_h']:.2f} h", "can be used", f"of {known['hours']:.2f} h recorded"),
+                KeyFigure(f"{known['offset_mean_m']:+.2f} m", "mean offset", "positive: left of the lane's centre"),
+                KeyFigure(f"{known['offset_sd_m']:.2f} m", "spread of the offset"),
+                KeyFigure(f"{100 * lost / (lost + known['rows']):.1f} %", "rows left out"),
+            ]
+        )
+    for what in facts["wrong"]:
+        page.warning(f"{what}." + (" With what is guessed below they can be read." if facts["guessed"] else ""))
+    page.section("What can be fitted")
+    cannot = facts["cannot"]
+    page.items(facts["can"] or ["Nothing yet."])
+    if cannot:
+        page.heading("What not, and what is in doubt")
+        page.items(cannot)
+    page.section("Columns", "What the headers and values were taken for; signs and units are yours to confirm.")
+    page.table(facts["columns"], "Quantiles in the unit of the table.")
+    if facts["others"]:
+        page.text(f"Others, which are context under their own names: {', '.join(facts['others'])}.")
+    if known:
+        page.section("Offsets")
+        page.figure(
+            _offsets(drives),
+            "How the offsets lie in the lane, the markings at its edges; all rows that are read.",
+            "Histogram of the offsets between the lane markings",
+        )
+        page.section("Drives")
+        rows = (
+            sorted(facts["drives"], key=lambda row: -row["minutes"]) if len(drives) > NAMED_DRIVES else facts["drives"]
+        )
+        shown = f" The longest {NAMED_DRIVES} of {len(rows)}." if len(rows) > NAMED_DRIVES else ""
+        page.table(
+            rows[:NAMED_DRIVES], f"Gaps are longer than 0.5 s.{shown}",
+            formats={"minutes": ".1f", "road-following [min]": ".1f", "mean offset [m]": ".2f", "spread [m]": ".2f"},
+        )  # fmt: skip
+        if known["left_out"]:
+            page.section("Rows left out")
+            page.table([{"why": why, "rows": count} for why, count in known["left_out"].items()])
+    page.section(
+        "Mapping",
+        "Read every line, correct it, and give the file with `--mapping`; `check` writes it with `--write-mapping`.",
+    )
+    page.items(f"`{line}`" for line in facts["mapping"].splitlines() if line)
+    return page.html({"inputs": parsed_hashes(files)})
+
+
+def _offsets(drives: Sequence[Drive]) -> Figure:
+    figure = Figure(1, 1, height=130.0)
+    (panel,) = figure.panels
+    offset = np.concatenate([drive.offset for drive in drives])
+    half = 0.5 * float(np.median(np.concatenate([drive.lane_width for drive in drives])))
+    density, edges = np.histogram(offset, np.linspace(-half, half, BINS + 1), density=True)
+    panel.steps(edges, density, MEASURED)
+    panel.x.label, panel.y.label = "offset, left of the lane's centre is positive [m]", "density [1/m]"
+    return figure
