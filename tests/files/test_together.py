@@ -61,7 +61,7 @@ VERBS = {
     "export": "export c -o {out} --force -p motorway | motorway-vehicle-3",
     "convert": "convert {given}/cut-in.xosc -o {out}/o.xosc --report {out}/r.html --time-limit 3 --seed 1 | 2",
     "reproduce": "reproduce -o {out}/o.xosc {given}/first.xosc | {given}/second.xosc",
-    "play": "play {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
+    "states": "states {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
     "view": "view {given}/cut-in.xosc -o {out}/o.html --image {out}/o.svg --no-open --time-limit 2 | 3",
     "fit": "fit {given}/drive.csv -o {out}/o.json --model two-level --source first | second",
     "evaluate": "evaluate {given}/drive.csv -p motorway --report {out}/o.html --seed 1 | 2",
