@@ -69,7 +69,6 @@ VERBS = {
     "detect": "detect {given}/cut-in.xosc -o {out}/o.csv --report {out}/o.html --time-limit 12 --seed 1 | 2",
     "import": "import table -o {out}/o.csv {given}/drive.csv | {given}/other.csv",
     "reconstruct": "reconstruct {given}/tracks.csv --road {given}/road.xodr -o {out}/ --force --version 1.2 | 1.1",
-    "derive": "profiles derive -o {out}/o.json motorway --mean 0.1 | 0.2",
     "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway-vehicle-2 | motorway-vehicle-3",
     "add": "profiles add {given}/own.json --library {out} --force --tag day | night",
 }
