@@ -82,7 +82,7 @@ Measure = Callable[[Any], float | None]
 
 
 def contents_of(path: Path | None) -> Contents:
-    """What ships, and claims of the user's users file, which replace those of the same id. Raises `FormatError`."""
+    """What ships, and claims of the user's own file, which replace those of the same id. Raises `FormatError`."""
     shipped = Path(str(files("xosc_lateral") / "resources" / "dossier.toml"))
     contents = _read(shipped)
     if path is None:
