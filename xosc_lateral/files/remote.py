@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import atexit
+import posixpath
 import re
 import shutil
 import tempfile
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from functools import cache
 from glob import glob, has_magic
 from importlib import import_module
 from pathlib import Path
+from typing import IO
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE
@@ -74,3 +77,40 @@ def _folder() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="xosc-lateral-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
+
+
+# ---- single files, without a copy: as they are now
+_URL = re.compile(r"[a-z][a-z0-9+.-]+://")
+
+
+def is_url(stated: object) -> bool:
+    """Whether it is a place that fsspec knows: ``s3://bucket/cut-in.xosc``, ``memory://a``."""
+    return isinstance(stated, str) and _URL.match(stated) is not None
+
+
+def open_url(url: str, mode: str) -> AbstractContextManager[IO[bytes]]:
+    """Open a file in a bucket or the like. Raises `FormatError`: what that needs is not installed."""
+    try:
+        import fsspec
+
+        opened: AbstractContextManager[IO[bytes]] = fsspec.open(url, mode)
+    except (ImportError, ValueError) as error:
+        raise FormatError(
+            f"can't be opened: {error} (pip install fsspec, and its package for this place)", path=url
+        ) from error
+    return opened
+
+
+def fetched(url: str) -> bytes:
+    """Bytes of a file there, as it is now. Raises `FormatError`: see `open_url`; it is too large."""
+    with open_url(url, "rb") as file:
+        data = file.read(FILE_SIZE.bytes + 1)
+    if len(data) > FILE_SIZE.bytes:
+        raise FormatError(FILE_SIZE.refusal(len(data) / 1e6), path=url)
+    return data
+
+
+def urljoin(base: str, written: str) -> str:
+    """Where a reference leads to, as seen from the file at a URL."""
+    scheme, _, path = base.partition("://")
+    return f"{scheme}://{posixpath.normpath(posixpath.join(posixpath.dirname(path), written))}"
