@@ -33,6 +33,7 @@ _HOME = {
     "compare_profiles": "workflows.profiles.profiles",
     "list_templates": "workflows.playing.templates",
     "write_template": "workflows.playing.templates",
+    "vary": "workflows.playing.vary",
     "live_esmini": "workflows.live.call",
     "live_sumo": "workflows.live.call",
     "Traffic": "workflows.live.traffic",
@@ -46,6 +47,7 @@ _HOME = {
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
     "Conversion": "workflows.conversion.conversion",
+    "Variations": "workflows.playing.vary",
     "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
@@ -94,6 +96,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "compare_profiles",
     "list_templates",
     "write_template",
+    "vary",
     "live_esmini",
     "live_sumo",
     "Traffic",
@@ -120,6 +123,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Health",
     "Detection",
     "Sight",
+    "Variations",
     "Dossier",
     "ImportedDrives",
     "XoscLateralError",
@@ -160,6 +164,7 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.live.traffic import Moment, Traffic
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
+    from xosc_lateral.workflows.playing.vary import Variations, vary
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check

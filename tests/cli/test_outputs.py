@@ -301,6 +301,8 @@ def test_last_releases_words_are_known(
         words = [player, "esmini", f"{enrich}=Ego", attempts, "2", "--ego", "none", "--time-limit", "1", "-q"]
         assert main(["convert", "cut-in.xosc", "-o", "c.xosc", *words]) == 0
         written.append([Path(name).read_bytes() for name in ("s.csv", "c.xosc")])
+        told = [line for line in capsys.readouterr().err.splitlines() if "is called" in line]
+        assert len(told) == (4 if verb == "play" else 0)
     assert written[0] == written[1]
     assert main(["convert", "-o", "out/", "--", "cut-in.xosc", "--for", "esmini"]) != 0  # files of these names
     assert "--for" in capsys.readouterr().err

@@ -38,6 +38,7 @@ VERBS = {
     "profiles": "The library of driver profiles.",
     "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
+    "vary": "A scenario's lane changes as real drivers take them.",
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",
 }
@@ -45,7 +46,7 @@ VERBS = {
 
 VERB_MODULES = {
     "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
-    "view": "play", "segments": "play", "template": "play", "import": "import_", "export": "live",
+    "view": "play", "segments": "play", "template": "play", "vary": "play", "import": "import_", "export": "live",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
@@ -107,7 +108,7 @@ class _Verbs(TyperGroup):
         self.commands = {name: TyperCommand(name, short_help=does) for name, does in VERBS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        word = OLD_VERBS.get(args[0], args[0])
+        word = _today(args[0], OLD_VERBS)
         name, known, rest = super().resolve_command(ctx, [word, *args[1:]])
         return name, known and verb(str(name)), [*_renamed(rest, OLD_OPTIONS.get(word, {}))]
 
@@ -119,7 +120,14 @@ def _renamed(words: Sequence[str], names: Mapping[str, str]) -> Iterator[str]:
             yield from words[k:]
             return
         option, equals, value = word.partition("=")
-        yield names.get(option, option) + equals + value
+        yield _today(option, names) + equals + value
+
+
+def _today(word: str, names: Mapping[str, str]) -> str:
+    """A word by its name of today; a former one is named on standard error."""
+    if word in names:
+        print(f"xosc-lateral: warning: {word} is called {names[word]} now, and will be unknown next", file=sys.stderr)
+    return names.get(word, word)
 
 
 app = typer.Typer(

@@ -164,3 +164,17 @@ def write(
     chosen: dict[str, str] = pairs(settings, "--set")
     written = xl.write_template(name, output, force=reply.force, **chosen)
     reply.say_written(written, template=name, settings=chosen)
+
+
+@command(
+    app, "vary", VERBS["vary"],
+    "vary cut-in.xosc --like mine.json -n 200 -o varied/", "convert varied/cut-in-like-mine.xosc -o out/",
+)
+def vary(
+    scenario: Scenario, *,
+    output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
+    options: Annotated[Options, xl.vary],
+    reply: Written,
+) -> None:
+    """Write variations of a scenario in which lane changes last as long as those of a profile's drivers."""
+    reply.say(xl.vary(scenario, output, **options, force=reply.force))

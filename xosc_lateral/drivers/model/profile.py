@@ -19,6 +19,7 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect
+from xosc_lateral.drivers.model.maneuvers import Maneuvers
 from xosc_lateral.drivers.model.records import Record, read_as, set_once
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.drivers.model.validity import Validity
@@ -108,7 +109,7 @@ MAX_LANE_WIDTH = 10.0
 class DriverProfile(Record, frozen=True):
     """What it takes to sample offsets. Raises `DriverProfileError` if a name is none, or its lane width is no width."""
 
-    later = ("left_hand", "beside", "validity")
+    later = ("left_hand", "beside", "validity", "maneuvers")
 
     name: str = field(name="id")  # The same in the file, in the file's name and wherever it is looked up.
     model: CoreModel  # Base movement.
@@ -121,6 +122,7 @@ class DriverProfile(Record, frozen=True):
     left_hand: bool = False  # Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
     beside: Mapping[str, Beside] = field(default_factory=dict)  # Whether its response on a side is known, and how.
     validity: Validity = Validity()  # Where it is known to hold.
+    maneuvers: Maneuvers | None = None  # How its drivers change lanes, where that was measured.
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -201,7 +203,18 @@ class DriverProfile(Record, frozen=True):
         values = super().to_dict()
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
-        order = ("id", "metadata", "validity", "lane_width", "left_hand", "model", "effects", "beside", "sensor")
+        order = (
+            "id",
+            "metadata",
+            "validity",
+            "lane_width",
+            "left_hand",
+            "model",
+            "effects",
+            "beside",
+            "sensor",
+            "maneuvers",
+        )
         present = {name: values[name] for name in (*order, "provenance") if name in values}
         return {"format": FORMAT, "version": VERSION, **present}
 

@@ -134,6 +134,7 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
         *(("effect", effect_line(effect)) for effect in profile.effects),
         ("neighbours", profile.responses_in_words()),
+        ("maneuvers", "" if profile.maneuvers is None else profile.maneuvers.in_words()),
         ("mean", f"{keeping.line('mean', 'm')}, {_side(keeping)} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),

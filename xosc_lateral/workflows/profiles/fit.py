@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from xosc_lateral.workflows.options import declare_options, flag
-from xosc_lateral.workflows.result import DrivesLike, Paths, ProfileLike, given_drives, given_profile, naming
+from xosc_lateral.workflows.result import DrivesLike, PathLike, Paths, ProfileLike, given_drives, given_profile, naming
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
@@ -65,6 +66,10 @@ def fit(
         kind=str, read=lambda text: None if text == "none" else text, metavar="PROFILE|none",
         help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
     )] = PRIOR_PROFILE,
+    maneuvers: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="RECORDING",
+        help="Recording whose lane changes the profile holds too: what `reconstruct` reads.")] = None,
+    road: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="FILE",
+        help="Road of that recording, where it holds none: OpenDRIVE, or SUMO's network.")] = None,
     library: Paths = (),
 ) -> DriverProfile:  # fmt: skip
     """Fit a driver profile.
@@ -117,6 +122,14 @@ def fit(
     if corrected and isinstance(profile.model, TwoLevelModel):
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
         profile = replace(profile, model=correct_two_level(profile.model), provenance=provenance)
+    if maneuvers is not None:
+        from xosc_lateral.files.source import parsed_hashes
+        from xosc_lateral.workflows.recordings.maneuvers import read_maneuvers
+
+        recording = Path(maneuvers)
+        profile = replace(profile, maneuvers=read_maneuvers(recording, None if road is None else Path(road)))
+        inputs = {**profile.provenance.inputs, **parsed_hashes([recording])}
+        profile = replace(profile, provenance=replace(profile.provenance, inputs=inputs))
     return replace(profile, left_hand=left_hand)
 
 

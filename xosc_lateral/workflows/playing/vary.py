@@ -1,0 +1,208 @@
+"""`vary`: a scenario's lane changes as the drivers of a maneuver profile take them, as parameter distributions."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import chain
+from itertools import count as numbers
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from lxml import etree
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.version import __version__
+from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
+from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
+
+if TYPE_CHECKING:
+    from xosc_lateral.drivers.model.maneuvers import Maneuvers
+    from xosc_lateral.files.openscenario.write.draft import Draft
+    from xosc_lateral.workflows.conversion.load import Played
+    from xosc_lateral.world.motion.nominal import PlayedAction
+
+DATE = "2024-01-01T00:00:00"  # the format asks for one: the same inputs and seed give the same bytes
+
+
+@declare_options
+def vary(
+    scenario: PathLike,
+    output: PathLike,
+    *,
+    like: Annotated[ProfileLike, flag(kind=str, metavar="PROFILE",
+        help="Profile with maneuvers: `fit --maneuvers RECORDING` makes one.")],
+    count: Annotated[int, flag("-n", "--count", min=1, max=100_000, help="Variations.")] = 100,
+    seed: int = 0,
+    allow: Paths = (),
+    library: Paths = (),
+    force: bool = False,
+) -> Variations:  # fmt: skip
+    """Write variations of a scenario in which lane changes last as long as those of real drivers.
+
+    Start and lane stay the scenario's. Each duration is drawn from the profile's lane changes to that side, those at
+    about its speed and in such a lane first, one for each lane change of each variation. Parameters that the scenario
+    has for them, as those of `reconstruct` and `template` do, are used, others declared.
+
+    Parameters
+    ----------
+    scenario : str or Path
+        Maneuver-based OpenSCENARIO file.
+    output : str or Path
+        Folder for the scenario with its parameters, and the parameter distribution of `convert` and other tools.
+    force : bool
+        Replace files that this package did not write.
+
+    Raises
+    ------
+    FormatError, PlaybackError
+        The scenario can't be played, or has no lane change with a duration.
+    DriverProfileError
+        The profile holds no maneuvers.
+    """
+    from xosc_lateral.base.errors import DriverProfileError, FormatError
+    from xosc_lateral.files.atomic import together, write_atomically
+    from xosc_lateral.files.openscenario.write import build
+    from xosc_lateral.files.openscenario.write.draft import Draft
+    from xosc_lateral.files.openscenario.write.fit import rewrite_paths
+    from xosc_lateral.files.output_paths import claim, output_folder, template_mark
+    from xosc_lateral.workflows.conversion.load import play_scenario
+    from xosc_lateral.workflows.result import as_paths
+
+    profile = given_profile(like, library)
+    if profile.maneuvers is None:
+        what = f"profile {profile.name} holds no maneuvers: fit TABLE... --maneuvers RECORDING makes one that does"
+        raise DriverProfileError(what)
+    played = play_scenario(Path(scenario), allowed=as_paths(allow))
+    draft = Draft(played.scenario, played.motion)
+    drawn = _drawn(draft, played, profile.maneuvers, count, np.random.default_rng(seed))
+    if not drawn:
+        raise FormatError("no lane change with a duration of its own begins", path=Path(scenario))
+    path = Path(scenario)
+    folder = output_folder(output)
+    varied, sets = folder / path.name, folder / f"{path.stem}-like-{profile.name}.xosc"
+    rewrite_paths(draft, varied)
+    distribution = _distribution(draft.version, varied.name, drawn, f"{path.name} like {profile.name}, seed {seed}")
+    texts = {varied: build.document(draft.root).decode(), sets: build.document(distribution).decode()}
+    claim(texts, [path], force=force)
+    with together():
+        for place, text in texts.items():
+            write_atomically(place, text.rstrip() + "\n" + template_mark(text))
+    return Variations(varied, sets, drawn)
+
+
+def _drawn(
+    draft: Draft, played: Played, maneuvers: Maneuvers, count: int, rng: np.random.Generator
+) -> dict[str, list[float]]:
+    """Parameter -> a duration for each variation [s]; the draft's lane changes refer to these parameters."""
+    from xosc_lateral.files.openscenario.references import parameter_name
+    from xosc_lateral.files.openscenario.write.draft import source_of
+    from xosc_lateral.world.scenario.private_actions import LaneChangeAction
+
+    drawn, declarations = dict[str, list[float]](), _declarations(draft.root)
+    own = {parameter_name(item.get("name") or "") for item in declarations}
+    actions = sorted(played.motion.actions, key=lambda one: (one.start, one.path))
+    for action in actions:
+        is_own = action.action.place.path == str(played.scenario.path)  # a catalog's is shared
+        change = action.action.content
+        if not isinstance(change, LaneChangeAction) or action.actor is None or not is_own:
+            continue
+        element = source_of(action.action, played.scenario, draft.root)
+        dynamics = element.find(".//{*}LaneChangeActionDynamics")
+        if dynamics is None or dynamics.get("dynamicsDimension") != "time" or dynamics.get("dynamicsShape") == "step":
+            continue
+        written = dynamics.get("value") or ""
+        name = parameter_name(written) if written.startswith("$") else ""
+        if name in drawn:
+            continue
+        if name not in own:
+            name = _free_name(f"{action.actor}_{action.path[-1]}_duration", own)
+            value = f"{change.dynamics.value:g}"
+            etree.SubElement(declarations, "ParameterDeclaration", name=name, parameterType="double", value=value)
+            dynamics.set("value", f"${name}")
+            own.add(name)
+        weights = _weights(action, played, maneuvers)
+        rows = rng.choice(len(weights), size=count, p=weights)
+        drawn[name] = np.round(maneuvers.column("duration")[rows], 3).tolist()
+    return drawn
+
+
+def _declarations(root: etree._Element) -> etree._Element:
+    """The element that holds the scenario's parameters; made where there is none."""
+    found = root.find("{*}ParameterDeclarations")
+    if found is None:
+        found = etree.Element("ParameterDeclarations")
+        root.insert(1, found)
+    return found
+
+
+def _free_name(wanted: str, taken: set[str]) -> str:
+    plain = re.sub(r"\W", "_", wanted, flags=re.ASCII)
+    names = chain([plain], (f"{plain}_{k}" for k in numbers(2)))
+    return next(name for name in names if name not in taken)
+
+
+def _weights(action: PlayedAction, played: Played, maneuvers: Maneuvers) -> FloatArray:
+    """Of the profile's rows, by what the scenario's vehicle does when it begins to change lanes."""
+    vehicle = next(one for one in played.motion.entities if one.name == action.actor)
+    end = vehicle.time[-1] if action.end is None else action.end
+    first, last = (min(int(np.searchsorted(vehicle.time, t)), len(vehicle.time) - 1) for t in (action.start, end))
+    road, lane = int(vehicle.road[first]), int(vehicle.lane[first])
+    aside = (int(vehicle.lane[last]) - lane) * played.network.travel_direction(road, lane)
+    width = float(played.network.lane_width(road, lane, vehicle.s[first]))
+    left = aside * int(vehicle.way(np.array([first]))[0]) > 0
+    return maneuvers.weights(left=left, speed=float(vehicle.speed[first]), lane_width=width)
+
+
+def _distribution(
+    version: tuple[int, int], scenario: str, drawn: dict[str, list[float]], description: str
+) -> etree._Element:
+    """The document that gives the parameters their values, a set for each variation."""
+    from xosc_lateral.files.openscenario.write.build import decimal, sub
+
+    root = etree.Element("OpenSCENARIO")
+    minor = max(version[1], 1)  # 1.0 has no parameter distributions
+    sub(root, "FileHeader", revMajor="1", revMinor=str(minor), date=DATE, description=description,
+        author=f"xosc-lateral {__version__}")  # fmt: skip
+    owner = sub(root, "ParameterValueDistribution")
+    sub(owner, "ScenarioFile", filepath=scenario)
+    holder = sub(owner, "Deterministic/DeterministicMultiParameterDistribution/ValueSetDistribution")
+    for values in zip(*drawn.values(), strict=True):
+        one = sub(holder, "ParameterValueSet")
+        for name, value in zip(drawn, values, strict=True):
+            sub(one, "ParameterAssignment", parameterRef=name, value=decimal(value, 3))
+    etree.indent(root, "  ")
+    return root
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Variations(Result):
+    """What was written."""
+
+    scenario: Path  # with a parameter for each lane change
+    distribution: Path  # of their values
+    durations: dict[str, list[float]]  # by parameter, for each variation [s]
+
+    def headline(self) -> str:
+        """One line."""
+        count = len(next(iter(self.durations.values())))
+        return f"{count} variations of {len(self.durations)} lane changes: {self.distribution}"
+
+    def __str__(self) -> str:
+        lines = [
+            f"  {name}: {np.median(values):.1f} s ({min(values):.1f} to {max(values):.1f} s)"
+            for name, values in self.durations.items()
+        ]
+        return "\n".join([self.headline(), *lines])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per variation, a column per parameter. [s]"""
+        return pd.DataFrame(self.durations)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {
+            "scenario": str(self.scenario), "distribution": str(self.distribution), "durations": self.durations,
+        }  # fmt: skip
