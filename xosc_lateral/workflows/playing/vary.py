@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import chain
 from itertools import count as numbers
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -139,7 +140,8 @@ def _declarations(root: etree._Element) -> etree._Element:
 
 def _free_name(wanted: str, taken: set[str]) -> str:
     plain = re.sub(r"\W", "_", wanted, flags=re.ASCII)
-    return next(name for name in (plain, *(f"{plain}_{k}" for k in numbers(2))) if name not in taken)
+    names = chain([plain], (f"{plain}_{k}" for k in numbers(2)))
+    return next(name for name in names if name not in taken)
 
 
 def _weights(action: PlayedAction, played: Played, maneuvers: Maneuvers) -> FloatArray:
