@@ -154,3 +154,28 @@ def test_what_cannot_be_varied_is_refused_in_a_line(profile: Path, tmp_path: Pat
     assert main(["vary", str(scenario), "--like", "motorway", "-o", str(tmp_path / "a")]) == 1
     assert "holds no maneuvers" in capsys.readouterr().err
     assert not (tmp_path / "a").exists()
+
+
+def test_drivers_move_before_a_lane_change_whose_begin_they_know(
+    profile: Path, found: Maneuvers, tmp_path: Path
+) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path)
+    own = xl.read_profile(profile)
+
+    def moved(driver: xl.DriverProfile, **settings: object) -> pd.Series:
+        rows = xl.convert(scenario, profile=driver, seed=3, neighbours="none", **settings).to_frame()
+        return rows[rows["name"] == "CutIn"].set_index("time")["deviation"]
+
+    without = replace(own, maneuvers=None)
+    (change,) = (one for one in xl.play(scenario)._played.motion.actions if "CutInEvent" in one.path)
+    difference = moved(own, ego=["none"]) - moved(without, ego=["none"])
+    time = difference.index.to_numpy() - change.start
+    way = np.array(found.before["right"])
+    expected = np.interp(time, BEFORE, way) * (0.5 + 0.5 * np.cos(np.pi * np.clip(time / 4.0, 0.0, 1.0)))
+    assert difference.max() > 0.7 * DRIFT  # to the left, before a change to the right
+    assert np.abs(difference - expected).max() < 0.03
+    assert not difference[(time < -8.3) | (time > 4.3)].abs().gt(1e-3).any()
+    # a vehicle under test decides when it begins: nobody knows that before
+    assert (moved(own, ego=["Ego"]) == moved(without, ego=["Ego"])).all()
+    # nor does anybody move who does not move in his lane
+    assert not moved(own, enrich=["Ego"], ego=["none"]).abs().max() > 1e-9

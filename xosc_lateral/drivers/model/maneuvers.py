@@ -67,6 +67,19 @@ class Maneuvers(Record, frozen=True):
         weights = np.where(allowed, np.exp(-0.5 * (distance - distance[allowed].min())), 0.0)
         return np.asarray(weights / weights.sum())
 
+    def anticipation(self, time: FloatArray, begin: float, end: float, *, left: bool, free: float) -> FloatArray:
+        """How drivers move in the seconds before a lane change from `begin` to `end`: offset, positive left. [m]
+
+        At times, shape (n,); from the end of the maneuver before on (`free`). What is left at the begin fades until the
+        end. [s]
+        """
+        way = np.array(self.before.get("left" if left else "right", (0.0,)))
+        moments = begin + BEFORE_STEP * np.arange(1 - len(way), 1)
+        first = min(max(moments[0], free), begin)
+        moved = np.interp(time, moments, way) - np.interp(first, moments, way)
+        fading = 0.5 + 0.5 * np.cos(np.pi * np.clip((time - begin) / (end - begin), 0.0, 1.0))
+        return np.asarray(np.where(time < first, 0.0, moved * fading))
+
     def in_words(self) -> str:
         """In a line."""
         low, middle, high = np.quantile(self.column("duration"), (0.1, 0.5, 0.9))

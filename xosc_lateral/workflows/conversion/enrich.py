@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.own_clock import within_heading
 from xosc_lateral.base.rows import BLOCK, blocks, columns
+from xosc_lateral.drivers.model.maneuvers import Maneuvers
 from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
@@ -249,6 +250,8 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
     samples: list[_Sample] = []
     for spans, knots, distance, segment, side, responses in blank.seen.segments:
         offset = side * sampler.sample(segment, responses=responses)
+        if driver.maneuvers is not None:
+            offset += _anticipated(driver.maneuvers, blank, spans, knots, side)
         more = least - len(knots)
         beyond = side * sampler.copy().sample(going_on(segment, more)) if more > 0 else np.empty(0)
         subject = f"profile {driver.name} for {blank.motion.name!r}"
@@ -256,6 +259,25 @@ def _draw(blank: _Drawn, driver: DriverProfile, seed: np.random.SeedSequence, wi
         error = sensor_error(sensor, offset, SAMPLE_STEP, seed, part=len(samples))
         samples.append(_Sample(spans, knots, distance, offset, error, beyond))
     return replace(blank, seen=blank.seen._replace(segments=()), samples=tuple(samples))
+
+
+def _anticipated(
+    maneuvers: Maneuvers, drawn: _Drawn, spans: Sequence[SegmentSpan], knots: IntArray, side: float
+) -> FloatArray:
+    """What a driver does before his lane changes of a run, whose begin he knows, on its knots. [m]
+
+    Those are lane changes that his movement goes on through: of vehicles that depend on nobody under test.
+    """
+    time = drawn.motion.time
+    offset, free = np.zeros(len(knots)), float(time[spans[0].first])
+    for one in drawn.crossings:
+        begin, end = float(time[one.first]), float(time[one.last])
+        if spans[0].first <= one.first and one.last <= spans[-1].last and end > begin:
+            if one.is_lane_change:
+                left = side * float(one.way[-1]) > 0.0
+                offset += side * maneuvers.anticipation(time[knots], begin, end, left=left, free=free)
+            free = end
+    return offset
 
 
 def _apart(
