@@ -178,4 +178,4 @@ def test_drivers_move_before_a_lane_change_whose_begin_they_know(
     # a vehicle under test decides when it begins: nobody knows that before
     assert (moved(own, ego=["Ego"]) == moved(without, ego=["Ego"])).all()
     # nor does anybody move who does not move in his lane
-    assert not moved(own, enrich=["Ego"], ego=["none"]).abs().max() > 1e-9
+    assert not moved(own, only=["Ego"], ego=["none"]).abs().max() > 1e-9
