@@ -17,6 +17,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
+from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 
 if TYPE_CHECKING:
@@ -150,13 +151,11 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 def _weights(action: PlayedAction, played: Played, maneuvers: Maneuvers) -> FloatArray:
     """Of the profile's rows, by what the scenario's vehicle does when it begins to change lanes."""
     vehicle = next(one for one in played.motion.entities if one.name == action.actor)
-    end = vehicle.time[-1] if action.end is None else action.end
-    first, last = (min(int(np.searchsorted(vehicle.time, t)), len(vehicle.time) - 1) for t in (action.start, end))
-    road, lane = int(vehicle.road[first]), int(vehicle.lane[first])
-    aside = (int(vehicle.lane[last]) - lane) * played.network.travel_direction(road, lane)
-    width = float(played.network.lane_width(road, lane, vehicle.s[first]))
-    left = aside * int(vehicle.way(np.array([first]))[0]) > 0
-    return maneuvers.weights(left=left, speed=float(vehicle.speed[first]), lane_width=width)
+    row = min(int(np.searchsorted(vehicle.time, action.start)), len(vehicle.time) - 1)
+    end = float(vehicle.time[-1]) if action.end is None else action.end
+    width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
+    left = leads_left(vehicle, played.network, action.start, end)
+    return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width)
 
 
 def _distribution(
