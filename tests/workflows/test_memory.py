@@ -184,3 +184,9 @@ def test_a_bucket_is_read_and_written_where_fsspec_is_installed(template):
         xl.play("nowhere://a.xosc")
     with pytest.raises(FileNotFoundError):
         xl.play("memory://bucket/none.xosc")
+
+
+def test_errors_call_files_in_memory_by_their_names() -> None:
+    with pytest.raises(xl.FormatError) as raised:
+        xl.convert(b"<OpenSCENARIO><x></OpenSCENARIO>")
+    assert str(raised.value).startswith("scenario.xosc:1: not well-formed XML")

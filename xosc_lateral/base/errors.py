@@ -6,14 +6,18 @@ fault (exit 1, one line); anything else is our bug and keeps its traceback.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+
+MEMORY_FOLDER = re.compile(r"/in-memory-[0-9a-f]{16}/(?:up/)*")
+"""Of files that a caller holds (`files.held`): he knows them by the names that come after it."""
 
 
 class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
 
     def __str__(self) -> str:
-        return printable(super().__str__())
+        return printable(MEMORY_FOLDER.sub("", super().__str__()))
 
 
 NO_BREAK_SPACES = "\u00a0\u202f"
