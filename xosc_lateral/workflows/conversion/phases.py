@@ -92,15 +92,15 @@ class _Phases:
         if profile is None or maneuvers is None:
             return self._offset
         moved, free = np.zeros(len(motion.time)), float(motion.time[0])
-        for one in sorted(self._own, key=lambda action: action.start):
-            if one.path not in self._lateral or one.end is None or not one.end > one.start:
+        for played in sorted(self._own, key=lambda action: action.start):
+            if played.path not in self._lateral or played.end is None or not played.end > played.start:
                 continue
-            if isinstance(one.action.content, LaneChangeAction) and one.path not in self._plan.depends.begins:
+            if isinstance(played.action.content, LaneChangeAction) and played.path not in self._plan.depends.begins:
                 road = self._network.roads[int(motion.road[self._entity.segments[0].span.first])]
                 mirror = -1.0 if (road.rule == "LHT") != profile.left_hand else 1.0
-                left = leads_left(motion, self._network, one.start, one.end) == (mirror > 0.0)
-                moved += mirror * maneuvers.anticipation(motion.time, one.start, one.end, left=left, free=free)
-            free = one.end
+                left = leads_left(motion, self._network, played.start, played.end) == (mirror > 0.0)
+                moved += mirror * maneuvers.anticipation(motion.time, played.start, played.end, left=left, free=free)
+            free = played.end
         return lambda distance: np.asarray(self._offset(distance) + np.interp(distance, self._driven, moved))
 
     def from_the_start(self, adding: Path | None) -> OffsetPath | None:
