@@ -40,6 +40,7 @@ RUN = (
     "how_to/derive_a_driver.md",
     "how_to/esmini.md",
     "how_to/from_a_recording.md",
+    "how_to/in_your_pipeline.md",
     "how_to/osi.md",
     "pipeline.md",
     "api.md",

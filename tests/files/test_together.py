@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import os
-import signal
+import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from examples.driver_simulator.simulator import simulate_drive
+from tests.kit.recordings import Case, road_file
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.atomic import mend, temporary_files, together, write_atomically
@@ -26,20 +28,22 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def in_child(work: Callable[[], object], *, kill_at: int | None = None, largest: int | None = None) -> int:
-    """Do it in another process, killed before its nth step, or where no file can be larger [byte]; its wait status."""
+def in_child(work: Callable[[], object], before: Callable[[], object] | None = None, largest: int | None = None) -> int:
+    """Do it in another process, something else before each step, or where no file is larger [byte]; its exit code."""
     child = os.fork()
     if child:
-        return os.waitpid(child, 0)[1]
-    code = 70
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    code, looking = 70, False
+
+    def watch(event: str, values: tuple[object, ...]) -> None:
+        nonlocal looking
+        written = event != "open" or int(str(values[2])) & (os.O_CREAT | os.O_WRONLY | os.O_RDWR)
+        if before is not None and not looking and event in STEPS and written:
+            looking = True
+            before()
+            looking = False
+
     try:
-        steps = itertools.count()
-
-        def watch(event: str, values: tuple[object, ...]) -> None:
-            written = event != "open" or int(str(values[2])) & (os.O_CREAT | os.O_WRONLY | os.O_RDWR)
-            if event in STEPS and written and kill_at is not None and next(steps) == kill_at:
-                os.kill(os.getpid(), signal.SIGKILL)
-
         sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 (for as long as the process)
         sys.addaudithook(watch)
         if largest is not None:
@@ -51,72 +55,95 @@ def in_child(work: Callable[[], object], *, kill_at: int | None = None, largest:
         os._exit(code)
 
 
-VERBS: dict[str, tuple[Sequence[str], Sequence[str]]] = {
-    "sample": (
-        ["sample", "-p", "motorway", "--duration", "20", "-o", "{}/o.csv"],
-        ["sample", "-p", "motorway", "--duration", "60", "-o", "{}/o.csv"],
-    ),
-    "template": (
-        ["template", "write", "cut-in", "-o", "{}"],
-        ["template", "write", "cut-in", "-o", "{}", "--set", "lane_width=3.5"],
-    ),
-    "export": (
-        ["export", "c", "-p", "motorway", "-o", "{}", "--force"],
-        ["export", "c", "-p", "motorway-vehicle-3", "-o", "{}", "--force"],
-    ),
+VERBS = {
+    "sample": "sample -p motorway -o {out}/o.csv --duration 20 | 60",
+    "template": "template write cut-in -o {out} --set lane_width=3.75 | lane_width=3.5",
+    "export": "export c -o {out} --force -p motorway | motorway-vehicle-3",
+    "convert": "convert {given}/cut-in.xosc -o {out}/o.xosc --report {out}/r.html --time-limit 3 --seed 1 | 2",
+    "reproduce": "reproduce -o {out}/o.xosc {given}/first.xosc | {given}/second.xosc",
+    "play": "play {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
+    "view": "view {given}/cut-in.xosc -o {out}/o.html --image {out}/o.svg --no-open --time-limit 2 | 3",
+    "fit": "fit {given}/drive.csv -o {out}/o.json --model two-level --source first | second",
+    "evaluate": "evaluate {given}/drive.csv -p motorway --report {out}/o.html --seed 1 | 2",
+    "close-loop": "close-loop {given}/drive.csv -p {given}/own.json -o {out}/o.json --report {out} --seed 1 | 2",
+    "detect": "detect {given}/cut-in.xosc -o {out}/o.csv --report {out}/o.html --time-limit 12 --seed 1 | 2",
+    "import": "import table -o {out}/o.csv {given}/drive.csv | {given}/other.csv",
+    "reconstruct": "reconstruct {given}/tracks.csv --road {given}/road.xodr -o {out}/ --force --version 1.2 | 1.1",
+    "derive": "profiles derive -o {out}/o.json motorway --mean 0.1 | 0.2",
+    "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway-vehicle-2 | motorway-vehicle-3",
+    "add": "profiles add {given}/own.json --library {out} --force --tag day | night",
 }
-"""Two commands with the same outputs: of a former run, and of the one that is hindered."""
+"""A command whose last word has two values: of a former run, and of the one that is hindered."""
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files that commands read."""
+    folder = tmp_path_factory.mktemp("given")
+    assert main(["template", "write", "cut-in", "-o", str(folder)]) == 0
+    for seed, name in enumerate(("drive", "other"), start=5):
+        simulate_drive(300.0, seed).table.to_csv(folder / f"{name}.csv", index=False)
+    assert main(["fit", str(folder / "drive.csv"), "-o", str(folder / "own.json"), "--model", "two-level"]) == 0
+    for seed, name in enumerate(("first", "second")):
+        words = ["convert", str(folder / "cut-in.xosc"), "-o", str(folder / f"{name}.xosc"), "--seed", str(seed)]
+        assert main([*words, "--time-limit", "2"]) == 0
+    Case(rate=10.0).tracks().to_csv(folder / "tracks.csv", index=False)
+    road_file(Case(), folder).rename(folder / "road.xodr")
+    return folder
 
 
 @pytest.fixture(scope="module", params=VERBS)
 def verb(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[list[str], list[str], dict[str, bytes], dict[str, bytes]]:
-    """Both commands, and what each leaves in a folder of its own; of `export`, the same names."""
-    made = []
-    commands = [list(words) for words in VERBS[request.param]]
-    for words in commands:
-        folder = tmp_path_factory.mktemp("alone") / "out"
-        assert main([word.format(folder) for word in words]) == 0
-        made.append(content(folder))
-    return commands[0], commands[1], made[0], made[1]
+    request: pytest.FixtureRequest, given: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Callable[[Path], int], dict[str, bytes], dict[str, bytes], Path]:
+    """The second command, what it and the first one leave in a folder, and that folder of the first."""
+    words, _, other = VERBS[request.param].partition(" | ")
+
+    def first(out: Path) -> int:
+        return main([word.format(out=out, given=given) for word in words.split()])
+
+    def second(out: Path) -> int:
+        return main([word.format(out=out, given=given) for word in [*words.split()[:-1], other]])
+
+    folder = tmp_path_factory.mktemp("alone")
+    old, new = (folder / name / "out" for name in ("old", "new"))
+    assert first(old) == 0
+    shutil.copytree(old, new)
+    assert second(new) == 0
+    return second, content(old), content(new), old
 
 
 def test_a_killed_run_leaves_the_old_output_or_the_new_one(
     verb, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before, after, old, new = verb
-    both = {**old, **new}
-    for step in range(60):
-        out = tmp_path / str(step) / "out"
-        assert main([word.format(out) for word in before]) == 0
-        status = in_child(lambda out=out: main([word.format(out) for word in after]), kill_at=step)
-        if os.WIFEXITED(status):
-            assert os.WEXITSTATUS(status) == 0
-            assert content(out) == both
-            break
-        mend([out / name for name in both])
-        assert content(out) in (old, both), step
-        assert main([word.format(out) for word in after]) == 0, capsys.readouterr().err
-        assert content(out) == both, step
-    else:
-        pytest.fail("it never ended")
-    assert step > 5
+    """What is on the disk before each step that writes is what a kill leaves there."""
+    run, old, new, folder = verb
+    out, steps = tmp_path / "now" / "out", itertools.count()
+    shutil.copytree(folder, out)
+    assert in_child(lambda: run(out), lambda: shutil.copytree(out, tmp_path / f"left {next(steps):03}" / "out")) == 0
+    assert content(out) == new
+    left = sorted(tmp_path.glob("left */out"))
+    assert len(left) > 2
+    for state in (left.pop(len(left) // 2), left.pop()):
+        assert run(state) == 0, capsys.readouterr().err
+        assert content(state) == new, state
+    for state in left:
+        mend([state / name for name in new])
+        assert content(state) in (old, new), state
 
 
 def test_a_full_disk_leaves_the_old_output_as_it_was(verb, tmp_path: Path) -> None:
-    before, after, old, new = verb
-    sizes = sorted({0, 40, *(len(data) - 1 for data in new.values())})
-    for largest in sizes:
+    run, old, new, folder = verb
+    changed = [len(data) for name, data in new.items() if old.get(name) != data]
+    for largest in (40, max(changed) - 1):
         out = tmp_path / str(largest) / "out"
-        assert main([word.format(out) for word in before]) == 0
-        status = in_child(lambda out=out: main([word.format(out) for word in after]), largest=largest)
-        assert os.WEXITSTATUS(status) == 1
+        shutil.copytree(folder, out)
+        assert in_child(lambda out=out: run(out), largest=largest) == 1
         assert content(out) == old
-        assert main([word.format(out) for word in after]) == 0
-        fresh = tmp_path / f"{largest} fresh" / "out"
-        in_child(lambda out=fresh: main([word.format(out) for word in after]), largest=largest)
-        assert not fresh.exists()
+    assert run(out) == 0
+    assert content(out) == new
+    in_child(lambda: run(tmp_path / "fresh"), largest=40)
+    assert not (tmp_path / "fresh").exists()
 
 
 def test_a_run_at_work_is_not_mended(tmp_path: Path) -> None:

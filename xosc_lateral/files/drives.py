@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -165,7 +165,7 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         since_1970 = epoch_factor(kept["time"].to_numpy(dtype=np.float64, na_value=np.nan))
         kept["time"] = kept["time"] if since_1970 == 1.0 else kept["time"] * since_1970
     recorded = {name: value for name, value in mapping.recorded.items() if name not in kept}
-    return from_middle(pd.DataFrame(kept).assign(**recorded), mapping, path)
+    return from_middle(pd.DataFrame(kept, copy=False).assign(**recorded), mapping, path)
 
 
 def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
@@ -204,8 +204,10 @@ def _numeric_columns(name: str, table: pd.DataFrame, path: Path) -> dict[str, Fl
         if numbers is None:
             return indicators(name, column, table.get("drive"), MAX_LEVELS)
         return {name: numbers.to_numpy(dtype=np.float64)}
-    values = numbers_of(column, path, name)
-    values[np.isinf(values) & ~drives_nobody(name, values)] = np.nan
+    is_plain = column.dtype == np.float64
+    values = np.asarray(column, dtype=np.float64) if is_plain else numbers_of(column, path, name)
+    if (endless := np.isinf(values)).any():
+        values = np.where(endless & ~drives_nobody(name, values), np.nan, values)
     wrong = np.zeros(0, dtype=np.bool_) if name in DRIVE_COLUMNS else implausible_rows(name, values)
     # a wrong unit of speed is said per drive, with what to do
     if wrong.any() and not (name == "speed" and np.nanmedian(values) > MAX_MEDIAN_SPEED):
@@ -213,7 +215,7 @@ def _numeric_columns(name: str, table: pd.DataFrame, path: Path) -> dict[str, Fl
             row = int(np.argmax(wrong))
             what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
             raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")
-        values[wrong] = np.nan
+        values = np.where(wrong, np.nan, values)
     return {name: values}
 
 
@@ -236,17 +238,28 @@ def rows_of_drives(table: pd.DataFrame, path: Path, label: str | None = None) ->
         if (missing := table[name].isna()).any():
             raise FormatError("no value", path=path, line=int(np.argmax(missing)) + 2, element=f"column {name!r}")
     if labels:
-        words = table[labels[-1]].map(str)
+        codes, names = _named(table[labels[-1]], str)
         if len(labels) > 1 and table["recording"].nunique() > 1:
-            words = table["recording"].map(as_word) + ":" + words
-        codes, every = words.factorize()
-        names = list(map(str, every))
-    time = numbers_of(table["time"], path, "time") if "time" in table else np.zeros(len(table))
-    runs = clock_runs(time, codes)
-    for code, name in enumerate(names):
-        mine = np.flatnonzero(codes == code)
-        for number, run in enumerate(np.unique(runs[mine]).tolist()):
-            yield (name if number == 0 else f"{name}#{number + 1}"), mine[runs[mine] == run]
+            of, recordings = _named(table["recording"], as_word)
+            codes, pairs = pd.factorize(of * len(names) + codes)
+            names = [f"{recordings[one // len(names)]}:{names[one % len(names)]}" for one in pairs.tolist()]
+    time = table["time"] if "time" in table else pd.Series(np.zeros(len(table)))
+    runs = clock_runs(np.asarray(time) if time.dtype == np.float64 else numbers_of(time, path, "time"), codes)
+    runs = runs if runs.any() else runs[:0]
+    order = np.argsort(codes, kind="stable")
+    bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
+    order = order.astype(np.min_scalar_type(-len(order) - 1))
+    del codes, time  # of long tables, what is kept here counts
+    for name, mine in zip(names, np.split(order, bounds), strict=True):
+        for number, run in enumerate(np.unique(runs[mine]).tolist() if len(runs) else [0]):
+            yield (name if number == 0 else f"{name}#{number + 1}"), mine[runs[mine] == run] if len(runs) else mine
+
+
+def _named(column: pd.Series, word: Callable[[object], str]) -> tuple[NDArray[np.intp], list[str]]:
+    """Which name each row has, and the names, in the order in which they come."""
+    codes, every = column.factorize()
+    again, names = pd.factorize(np.array([word(one) for one in every], dtype=object))
+    return again[codes], list(names)
 
 
 # ---- what drives are called: a drive is its file, and its own label where the file gives one -------------------------

@@ -84,8 +84,11 @@ def _units_in(cells: list[str]) -> tuple[str, ...]:
 
 def late_comments(text: IO[bytes], start: int, mark: str) -> list[int]:
     """Lines beyond the head that begin with the mark of comments, counted from the header at `start`."""
-    text.seek(start)
     sought, place, begins = mark.encode(), start, list[int]()
+    text.seek(start)
+    if not any(b"\n" + sought in b"\n" + part for part in iter(lambda: text.read(1 << 24), b"")):
+        return begins
+    text.seek(start)
     for number, line in enumerate(text):
         if line.startswith(sought) and place >= HEAD_SIZE:
             begins.append(number)

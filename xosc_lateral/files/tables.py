@@ -34,6 +34,7 @@ TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 _CHUNK = 1 << 20
+PART_ROWS = 500_000  # of a text are in memory as cells [-]
 
 _DOUBLE = 8
 
@@ -60,7 +61,7 @@ def read_text_table(path: Path) -> pd.DataFrame:
 def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv: Any) -> pd.DataFrame:
     if path.name.lower().endswith(PARQUET):
         with foreign_errors(path, "can't be read as a table"):
-            table: pd.DataFrame = read_parquet(path).to_pandas()
+            table: pd.DataFrame = read_parquet(path).to_pandas(split_blocks=True, self_destruct=True)
             if isinstance(table.index, pd.DatetimeIndex):
                 table = frame_of(table)
             if not table.columns.is_unique:
@@ -81,10 +82,23 @@ def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv
         text.seek(layout.start)
         separator = layout.separator or _separator(text, path, layout.start)
         csv |= {"skiprows": skipped} if skipped else {}
-        table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
+        table = _in_parts(text, layout.start, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
         table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
         table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
+
+
+def _in_parts(text: IO[bytes], start: int, **csv: Any) -> pd.DataFrame:
+    """The table, in little more memory than its numbers take: read in parts, as whole where these differ in kind."""
+    columns: dict[str, list[pd.Series]] = {}
+    for part in pd.read_csv(text, chunksize=PART_ROWS, **csv):
+        for name in part.columns:
+            columns.setdefault(name, []).append(part[name].copy())  # the part itself goes
+    if not columns or any(len({one.dtype.kind in "iuf" or one.dtype for one in each}) > 1 for each in columns.values()):
+        text.seek(start)
+        whole: pd.DataFrame = pd.read_csv(text, **csv)
+        return whole
+    return pd.DataFrame({name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}, copy=False)
 
 
 def _is_filler(name: str, column: pd.Series) -> bool:

@@ -96,10 +96,11 @@ def clean_drive(
         return None
     every = {key: values[good] for key, values in columns.items() if key not in DRIVE_COLUMNS}
     empty = frozenset(key for key, values in every.items() if np.isnan(values).all())
-    context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": lane_width[good]}
+    width = lane_width[good]
+    context = {key: values for key, values in every.items() if key not in empty} | {"lane_width": width}
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
     drive = Drive(
-        name, columns["time"][good], offset[good], lane_width[good],
+        name, columns["time"][good], offset[good], width,
         context, frozenset(levels & context.keys()), str(path), run, empty=empty,
         valid_below=_stated(VALID_BELOW, columns, good, path), resolution=_stated(RESOLUTION, columns, good, path),
     )  # fmt: skip

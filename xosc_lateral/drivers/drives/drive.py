@@ -125,12 +125,15 @@ def _freeze(series: Drive | Run, name: str) -> None:
 
     if (number := getattr(series, "run", None)) is not None:
         object.__setattr__(series, "run", frozen("run", number, np.int64))
+    width = series.lane_width
     for label in ("time", "offset", "lane_width", "half_width"):
         if (values := getattr(series, label, None)) is not None:
             object.__setattr__(series, label, frozen(label, values))
             if not np.isfinite(values).all():
                 raise ValueError(f"drive {name}: {label} is not finite")
-    context = {key: frozen(key, values) for key, values in series.context.items()}
+    context = {
+        key: series.lane_width if values is width else frozen(key, values) for key, values in series.context.items()
+    }
     object.__setattr__(series, "context", MappingProxyType(context))
 
 

@@ -108,6 +108,7 @@ def _told(read: Callable[..., object], format: str, options: Mapping[str, Any]) 
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
         return dict(options)
     kinds, told = {parameter.name: parameter.annotation for parameter in known}, {}
+    kinds |= {"keep_cut": bool} if getattr(read, "can_keep_cut", False) else {}
     for name, value in options.items():
         if name not in kinds:
             raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
@@ -243,6 +244,7 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
             _refuse_nonsense(kept, path)
         return ImportedDrives(kept, record)
 
+    within.can_keep_cut = True  # type: ignore[attr-defined]
     return within
 
 
