@@ -327,7 +327,7 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     fine = shaped(np.sqrt(kept_power / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
     if fast is not None:
-        made = as_bursting(made, lambda one: simulate(one, SEEN_ROWS, SEED, drivers=SEEN_DRIVERS), model)
+        made = as_bursting(made, lambda varied: simulate(varied, SEEN_ROWS, SEED, drivers=SEEN_DRIVERS), model)
     kept = [
         effect
         for effect in profile.effects
