@@ -46,7 +46,7 @@ def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
 def test_a_run_that_is_cut_off_warns_when_quiet_and_fails_when_strict(
     verb: str, scenario: Path, tmp_path: Path
 ) -> None:
-    output = tmp_path / ("s.csv" if verb == "play" else "out.xosc")
+    output = tmp_path / ("s.csv" if verb == "states" else "out.xosc")
     words = [verb, str(scenario), "-o", str(output), "-q"]
     cut = RUN.invoke(app, [*words, "--time-limit", "1"])
     assert cut.exit_code == 0 and "time limit of 1 s" in cut.stderr
@@ -81,7 +81,7 @@ def test_a_missing_vehicle_catalog_is_an_error_when_strict(scenario: Path, tmp_p
     assert usual.exit_code == 0
     assert "played as a car of usual size" in usual.stderr
     table.unlink()
-    for words in (["play", str(scenario), "-o", str(table)], ["convert", str(scenario), "-o", str(enriched)]):
+    for words in (["states", str(scenario), "-o", str(table)], ["convert", str(scenario), "-o", str(enriched)]):
         refused = RUN.invoke(app, [*words, "--strict"])
         assert isinstance(refused.exception, FormatError)
         assert "catalog 'Cars' not found" in str(refused.exception)

@@ -98,7 +98,7 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path, output: str | None, options: dict[str, Any], limits: Mapping[str, float], variants: int,
+    source: Path, output: str | None, options: dict[str, Any], limits: Options, variants: int,
     report: str | None, osi: str | None, summary: str | None, reply: Written, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
