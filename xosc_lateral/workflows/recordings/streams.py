@@ -13,8 +13,8 @@ from xosc_lateral.workflows.recordings.importers.tracks import Strip
 
 SPACING = 1.0  # of points on a path [m]
 DRIVING = 0.5  # who is slower stands, and only seems to go on a way [m/s]
-SHORTEST = 20.0  # of a path, or a lane where streams part: less says nothing about who drives where [m]
-NEAR = 1.5  # farther from a path's line is another lane's: half a narrow one [m]
+LEAST_LENGTH = 20.0  # of a path, or a lane where streams part: less says nothing about who drives where [m]
+LANE_DISTANCE = 1.5  # farther from a path's line is another lane's: half a narrow one [m]
 ALONG = np.cos(np.radians(20.0))  # who goes another way by more is of another stream [-]
 WITHIN = 0.9  # of a path's points that have to lie so along a stream [-]
 LEAST_OTHERS = 6  # so many vehicles make a lane [-]
@@ -32,7 +32,7 @@ class _Stream:
 
         away, k = cKDTree(self.points).query(path)
         agreement = (_tangents(path) * _tangents(self.points)[k]).sum(axis=1)
-        return np.asarray(away), np.asarray((away < NEAR) & (agreement > ALONG))
+        return np.asarray(away), np.asarray((away < LANE_DISTANCE) & (agreement > ALONG))
 
 
 def _tangents(points: FloatArray) -> FloatArray:
@@ -48,7 +48,7 @@ def streams(x: FloatArray, y: FloatArray, speed: FloatArray, vehicle: IntArray) 
         if len(moving) > 1:
             way = np.r_[0.0, np.cumsum(np.hypot(np.diff(x[moving]), np.diff(y[moving])))]
             at = np.arange(0.0, way[-1], SPACING)
-            if len(at) * SPACING >= SHORTEST:
+            if len(at) * SPACING >= LEAST_LENGTH:
                 paths.append(np.stack([np.interp(at, way, x[moving]), np.interp(at, way, y[moving])], axis=1))
     found = list[_Stream]()
     for path in sorted(paths, key=len, reverse=True):
@@ -62,7 +62,7 @@ def streams(x: FloatArray, y: FloatArray, speed: FloatArray, vehicle: IntArray) 
             found.append(best)
         best.paths.append(path)
     busy = sorted((one for one in found if len(one.paths) >= LEAST_OTHERS), key=lambda one: -len(one.paths))
-    return [line for one in busy if len(line := _mean_path(one)) * SPACING >= SHORTEST]
+    return [line for one in busy if len(line := _mean_path(one)) * SPACING >= LEAST_LENGTH]
 
 
 def _mean_path(stream: _Stream) -> FloatArray:
@@ -71,11 +71,11 @@ def _mean_path(stream: _Stream) -> FloatArray:
 
     points = stream.points
     for _ in range(ROUNDS):
-        strip = strip_about(points, 2.0 * NEAR)
+        strip = strip_about(points, 2.0 * LANE_DISTANCE)
         count, total = np.zeros(len(points)), np.zeros(len(points))
         for path in stream.paths:
             way, aside, *_ = strip.place(*path.T)
-            near = np.isfinite(way) & (np.abs(aside) < NEAR)
+            near = np.isfinite(way) & (np.abs(aside) < LANE_DISTANCE)
             at = np.clip(np.round(way[near] / strip.length * (len(points) - 1)).astype(np.int64), 0, len(points) - 1)
             at, first = np.unique(at, return_index=True)
             count[at] += 1.0
@@ -149,17 +149,17 @@ def _apart(places: list[int], last: int) -> list[int]:
     """Cuts of a line that are far enough from each other and from its ends."""
     kept = [0]
     for place in places:
-        if place - kept[-1] >= 0.5 * SHORTEST and last - place >= 0.5 * SHORTEST:
+        if place - kept[-1] >= 0.5 * LEAST_LENGTH and last - place >= 0.5 * LEAST_LENGTH:
             kept.append(place)
     return [*kept, last]
 
 
 def _runs(owner: IntArray) -> list[tuple[int, slice]]:
-    """Stretches of one owner (-1: none), those under `SHORTEST` taken as part of what is before them."""
+    """Stretches of one owner (-1: none), those under `LEAST_LENGTH` taken as part of what is before them."""
     edges = np.r_[0, np.flatnonzero(np.diff(owner)) + 1, len(owner)]
     runs = list[tuple[int, slice]]()
     for first, last in pairwise(edges.tolist()):
-        if last - first < SHORTEST / SPACING and (runs or last < len(owner)):
+        if last - first < LEAST_LENGTH / SPACING and (runs or last < len(owner)):
             if runs:
                 runs[-1] = runs[-1][0], slice(runs[-1][1].start, last)
             continue
