@@ -50,19 +50,21 @@ def streams(x: FloatArray, y: FloatArray, speed: FloatArray, vehicle: IntArray) 
             at = np.arange(0.0, way[-1], SPACING)
             if len(at) * SPACING >= LEAST_LENGTH:
                 paths.append(np.stack([np.interp(at, way, x[moving]), np.interp(at, way, y[moving])], axis=1))
-    found = list[_Stream]()
+    bundles = list[_Stream]()
     for path in sorted(paths, key=len, reverse=True):
         best, nearest = None, np.inf
-        for stream in found:
+        for stream in bundles:
             away, along = stream.beside(path)
             if along.mean() >= WITHIN and away[along].mean() < nearest:
                 best, nearest = stream, float(away[along].mean())
         if best is None:
             best = _Stream(path)
-            found.append(best)
+            bundles.append(best)
         best.paths.append(path)
-    busy = sorted((one for one in found if len(one.paths) >= LEAST_OTHERS), key=lambda one: -len(one.paths))
-    return [line for one in busy if len(line := _mean_path(one)) * SPACING >= LEAST_LENGTH]
+    busy = sorted(
+        (stream for stream in bundles if len(stream.paths) >= LEAST_OTHERS), key=lambda stream: -len(stream.paths)
+    )
+    return [line for stream in busy if len(line := _mean_path(stream)) * SPACING >= LEAST_LENGTH]
 
 
 def _mean_path(stream: _Stream) -> FloatArray:
@@ -100,7 +102,7 @@ def strip_about(points: FloatArray, width: float) -> Strip:
 
 def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[list[int]]]:
     """Lanes, shape (n, 2) each, and those that each leads to; streams that go along one another are one lane there."""
-    own = list[FloatArray]()  # of each stream what no earlier one has
+    parts = list[FloatArray]()  # of each stream what no earlier one has
     cuts: list[set[int]] = []
     links = list[tuple[tuple[int, int], tuple[int, int]]]()  # from a lane's point to another's
     from scipy.spatial import cKDTree
@@ -108,7 +110,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
     for line in lines:
         owner, place = np.full(len(line), -1), np.zeros(len(line), dtype=np.int64)
         nearest = np.full(len(line), np.inf)
-        for number, other in enumerate(own):
+        for number, other in enumerate(parts):
             away, along = _Stream(other).beside(line)
             better = along & (away < nearest)
             owner[better], nearest[better] = number, away[better]
@@ -116,9 +118,9 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
         before: tuple[int, int] | None = None
         for number, part in _runs(owner):
             if number < 0:
-                own.append(line[part])
+                parts.append(line[part])
                 cuts.append({0, part.stop - part.start - 1})
-                begin, end = (len(own) - 1, 0), (len(own) - 1, part.stop - part.start - 1)
+                begin, end = (len(parts) - 1, 0), (len(parts) - 1, part.stop - part.start - 1)
             else:
                 begin, end = (number, int(place[part.start])), (number, int(place[part.stop - 1]))
             if before is not None and before[0] != begin[0]:
@@ -128,7 +130,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
             before = end
     lanes, following = list[FloatArray](), list[list[int]]()
     ends, starts = dict[tuple[int, int], int](), dict[tuple[int, int], int]()
-    for number, line in enumerate(own):
+    for number, line in enumerate(parts):
         ordered = _apart(sorted(cuts[number]), len(line) - 1)
         for first, last in pairwise(ordered):
             starts[number, first] = ends[number, last] = len(lanes)

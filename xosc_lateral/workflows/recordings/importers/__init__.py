@@ -107,16 +107,16 @@ def _known_options(read: Callable[..., object], format: str, options: Mapping[st
     _, *known = inspect.signature(read).parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
         return dict(options)
-    kinds, told = {parameter.name: parameter.annotation for parameter in known}, {}
+    kinds, known_values = {parameter.name: parameter.annotation for parameter in known}, {}
     kinds |= {"keep_cut": bool} if getattr(read, "can_keep_cut", False) else {}
     for name, value in options.items():
         if name not in kinds:
             raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
         try:
-            told[name] = NUMBERS.get(kinds[name], str)(value) if isinstance(value, str) else value
+            known_values[name] = NUMBERS.get(kinds[name], str)(value) if isinstance(value, str) else value
         except ValueError as error:
             raise FormatError(f"importer {format!r}: {name} {value!r} is not a number") from error
-    return told
+    return known_values
 
 
 @dataclass(frozen=True, kw_only=True)
