@@ -56,14 +56,18 @@ def drives(path: Path, seed: int, *, in_km_h: bool = False) -> None:
 
 
 def _dlr_wheel(path: Path) -> None:
+    from tests.workflows.recordings.test_dlr_ut import write_city
     from tests.workflows.recordings.test_importers import _dlr_recording
 
     inner, folder = io.BytesIO(), "DLR-Highway-Traffic-dataset_v1-1-0"
     with zipfile.ZipFile(inner, "w") as archive:
         text = _dlr_recording(11, per_lane=16)[0].to_csv(index=False)
         archive.writestr(f"{folder}/raw_data/trajectories/trajectories_1.csv", text)
+    city = path.with_name("DLR-Urban-Traffic-dataset_v1-2-0.zip")
+    write_city(city)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(f"tasi/dataset/data/{folder}.zip", inner.getvalue())
+        archive.write(city, f"tasi/dataset/data/{city.name}")
 
 
 def _highd(path: Path) -> None:

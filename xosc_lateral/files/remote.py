@@ -41,8 +41,8 @@ def _files_of(path: str | Path, *, is_pattern: bool) -> list[Path]:
         return _copies(match[1], match[2], is_pattern)
     if not is_pattern or Path(path).exists():
         return [Path(path)]
-    if found := [Path(file) for file in sorted(glob(str(path), recursive=True))]:  # noqa: PTH207 (a whole path)
-        return found
+    if matches := [Path(file) for file in sorted(glob(str(path), recursive=True))]:  # noqa: PTH207 (a whole path)
+        return matches
     raise FormatError("no file is called so", path=path)
 
 
@@ -55,8 +55,8 @@ def _copies(scheme: str, rest: str, is_pattern: bool) -> list[Path]:
         raise FormatError(f"{scheme}:// needs fsspec: pip install fsspec", path=address) from error
     try:
         files, place = url_to_fs(address)
-        found, made = sorted(files.glob(place)) if is_pattern else [place], list[Path]()
-        for name in found:
+        names, made = sorted(files.glob(place)) if is_pattern else [place], list[Path]()
+        for name in names:
             if (size := sum(files.du(name, total=False).values())) > FILE_SIZE.bytes:
                 raise FormatError(FILE_SIZE.refusal(size / 1e6), path=address)
             made.append(_folder() / scheme / str(name).lstrip("/"))
