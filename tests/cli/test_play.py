@@ -46,7 +46,7 @@ def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
 def test_a_run_that_is_cut_off_warns_when_quiet_and_fails_when_strict(
     verb: str, scenario: Path, tmp_path: Path
 ) -> None:
-    output = tmp_path / ("s.csv" if verb == "play" else "out.xosc")
+    output = tmp_path / ("s.csv" if verb == "states" else "out.xosc")
     words = [verb, str(scenario), "-o", str(output), "-q"]
     cut = RUN.invoke(app, [*words, "--time-limit", "1"])
     assert cut.exit_code == 0 and "time limit of 1 s" in cut.stderr
