@@ -166,9 +166,9 @@ def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) 
             if name not in headers
         ),
     ]
-    for one in columns:
-        if one.name != "drive" and not len(one.numbers):
-            lines += _texts(one.name, one.values)
+    for column in columns:
+        if column.name != "drive" and not len(column.numbers):
+            lines += _texts(column.name, column.values)
     if left:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
@@ -226,13 +226,13 @@ def _unit_of(name: str, header: str, column: pd.Series) -> tuple[str, str]:
     return unit, "unit by the size of its values" if unit else "by its header"
 
 
-def _line(one: Recognised) -> str:
-    numbers = one.numbers
+def _line(column: Recognised) -> str:
+    numbers = column.numbers
     seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
-    sign = f"; CHECK: {SIGNS[one.name]}" if one.name in SIGNS else ""
-    source = f"{one.header}:{one.unit}" if one.unit else one.header
-    entry = f"{{column = {_quoted(one.header)}}}" if ":" in one.header and not one.unit else _quoted(source)
-    return f"{one.name} = {entry}  # {one.why}{seen}{sign}"
+    sign = f"; CHECK: {SIGNS[column.name]}" if column.name in SIGNS else ""
+    source = f"{column.header}:{column.unit}" if column.unit else column.header
+    entry = f"{{column = {_quoted(column.header)}}}" if ":" in column.header and not column.unit else _quoted(source)
+    return f"{column.name} = {entry}  # {column.why}{seen}{sign}"
 
 
 def _numbers(column: pd.Series) -> FloatArray:
