@@ -58,6 +58,8 @@ SHAPES: list[ColumnEffect] = [
     Nearness(acts=ACTS, column="gap", scale=20.0),
     Nearness(acts=ACTS, column="gap", presence=True),
     Proximity(acts=ACTS, column="gap", scale=20.0),
+    Linear(acts=ACTS, column="x", episode=0.8),
+    Proximity(acts=ACTS, column="gap", scale=20.0, episode=0.4),
     Product(acts=ACTS, factors=(Factor(column="x"), Factor(column="heading", form=Form.SINE, at=360.0))),
     Product(acts=ACTS, factors=(Factor(column="lane", form=Form.EQUALS, at=1.0), Factor(column="y", at=0.2))),
     Product(acts=ACTS, factors=(Factor(column="gap", form=Form.PROXIMITY, at=20.0), Factor(column="x"))),
@@ -147,7 +149,7 @@ def test_all_beside_each_other(coarse: Coarse, tmp_path: Path) -> None:
         MeanTerm.of(SHAPES[0]),
         CourseTerm.over_time(SHAPES[6], np.array([0.1, -0.05])),
         SpreadTerm.of(SHAPES[7]),
-        FineNoiseTerm.of(SHAPES[11]),
+        FineNoiseTerm.of(SHAPES[-3]),
         BetweenTerm.of(structs.replace(SHAPES[1], response_s=60.0)),
     ]
     fitted = goes_through(coarse, [*columns, hidden[1], hidden[3], hidden[5], hidden[7]], tmp_path)
