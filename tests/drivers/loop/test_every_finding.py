@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from msgspec import structs
 
+from examples.driver_simulator.simulator import simulate_drive
+from tests.kit import simulated as plants
 from tests.kit.coarse import STEP, coarse_of, movement, wander
-from xosc_lateral.drivers.loop import held_out, selection
+from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.loop import close, held_out, selection
 from xosc_lateral.drivers.loop.columns import Column, Values
 from xosc_lateral.drivers.loop.dictionary import Search
 from xosc_lateral.drivers.loop.model import Fitted, Outcome, Term, fit_model
 from xosc_lateral.drivers.loop.residual import simulated_runs
-from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, Selection, select
-from xosc_lateral.drivers.loop.terms.between import BetweenTerm
+from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, TERMS, Accepted, Selection, select
+from xosc_lateral.drivers.loop.terms.between import BetweenSpreadTerm, BetweenTerm
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm
 from xosc_lateral.drivers.loop.terms.hidden import CycleTerm, RegimesTerm, fit_regimes
 from xosc_lateral.drivers.loop.terms.mean import CourseTerm, MeanTerm
@@ -37,6 +42,8 @@ from xosc_lateral.drivers.model.effects.shapes import (
     Threshold,
 )
 from xosc_lateral.files.profiles import read_profile, write_profile
+from xosc_lateral.workflows.profiles.loop_json import loop_record
+from xosc_lateral.workflows.profiles.loop_words import lack_of_fit_words
 
 ACTS = Acts.LOCATION
 SHAPES: list[ColumnEffect] = [
@@ -51,6 +58,8 @@ SHAPES: list[ColumnEffect] = [
     Nearness(acts=ACTS, column="gap", scale=20.0),
     Nearness(acts=ACTS, column="gap", presence=True),
     Proximity(acts=ACTS, column="gap", scale=20.0),
+    Linear(acts=ACTS, column="x", episode=0.8),
+    Proximity(acts=ACTS, column="gap", scale=20.0, episode=0.4),
     Product(acts=ACTS, factors=(Factor(column="x"), Factor(column="heading", form=Form.SINE, at=360.0))),
     Product(acts=ACTS, factors=(Factor(column="lane", form=Form.EQUALS, at=1.0), Factor(column="y", at=0.2))),
     Product(acts=ACTS, factors=(Factor(column="gap", form=Form.PROXIMITY, at=20.0), Factor(column="x"))),
@@ -140,11 +149,41 @@ def test_all_beside_each_other(coarse: Coarse, tmp_path: Path) -> None:
         MeanTerm.of(SHAPES[0]),
         CourseTerm.over_time(SHAPES[6], np.array([0.1, -0.05])),
         SpreadTerm.of(SHAPES[7]),
-        FineNoiseTerm.of(SHAPES[11]),
+        FineNoiseTerm.of(SHAPES[-3]),
         BetweenTerm.of(structs.replace(SHAPES[1], response_s=60.0)),
     ]
     fitted = goes_through(coarse, [*columns, hidden[1], hidden[3], hidden[5], hidden[7]], tmp_path)
     assert len(fitted.estimates) == 9
+
+
+@pytest.fixture(scope="module")
+def campaign() -> Coarse:
+    """Eight drives of two minutes and a half, each with its passengers."""
+    rng, drives = np.random.default_rng(73), 8
+    n = round(180.0 / STEP)
+    passengers = np.repeat(np.arange(drives) % 4.0, n)
+    gap = np.where(wander(rng, drives * n, 60.0) > 0.3, 30.0, np.nan)
+    context = {"x": passengers, "y": wander(rng, drives * n, 20.0), "lane": np.clip(passengers, 0.0, 2.0)}
+    context |= {"heading": 90.0 * passengers, "gap": gap}
+    return coarse_of(movement(rng, 180.0 * drives) * (1.0 + 0.3 * passengers), context, drives=drives)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
+def test_every_shape_acts_between_drives(campaign: Coarse, shape: ColumnEffect, tmp_path: Path) -> None:
+    goes_through(campaign, [BetweenTerm.of(structs.replace(shape, response_s=60.0))], tmp_path)
+
+
+def test_what_differs_between_drives_beside_each_other(campaign: Coarse, tmp_path: Path) -> None:
+    passengers = structs.replace(SHAPES[0], response_s=60.0)
+    goes_through(campaign, [BetweenSpreadTerm.of(passengers)], tmp_path)
+    both = [BetweenSpreadTerm.of(passengers), BetweenTerm.of(structs.replace(SHAPES[6], response_s=60.0))]
+    fitted = goes_through(campaign, [*both, SpreadTerm.of(SHAPES[9]), TimeSpreadTerm(order=1)], tmp_path)
+    assert len(fitted.estimates) == 4
+
+
+def test_no_kind_of_finding_is_left_out(coarse: Coarse) -> None:
+    of_columns = {MeanTerm, SpreadTerm, SlowSpreadTerm, FineNoiseTerm, CourseTerm, BetweenTerm, BetweenSpreadTerm}
+    assert of_columns | set(map(type, hidden_terms(coarse))) == set(TERMS)
 
 
 def test_what_was_found_is_kept_where_a_later_stage_fails(coarse: Coarse, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -170,3 +209,19 @@ def test_what_cannot_be_told_is_taken_back(coarse: Coarse, monkeypatch: pytest.M
     found = select(search)
     assert found.accepted == ()
     assert [one.columns for one in found.rejected if one.was_found] == [("x",)]
+
+
+def test_closing_words_that_fail_cost_no_finding(driven: Callable[..., list[Drive]], monkeypatch: Any) -> None:
+    def breaks(*_: object, **__: object) -> None:
+        raise ValueError("matmul")
+
+    for stage in ("_explained", "check_remainder", "what_drives_show"):
+        monkeypatch.setattr(close, stage, breaks)
+    table = simulate_drive(30.0, 1).table
+    drop = [name for name in CONTEXT_UNITS if name in table and name not in ("truck_right", "speed")]
+    result = close.close_loop(driven(101, [plants.truck_avoidance(0.5)], 700.0, drop=drop), seed=1)
+    assert [finding.columns for finding in result.findings] == [("truck_right",)]
+    failed = [one.component for one in result.identified.selection.rejected if "a fault of this program" in one.why]
+    assert failed == ["share of the explainable", "what is left", "what these drives can show"]
+    assert loop_record(result, [])["unexplained"]["omnibus"] is None
+    assert "the check failed" in lack_of_fit_words(result)

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.compiled import SANITIZED, CompiledDriver, build, row_of, segment_of, varying
-from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS
+from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS, made
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
@@ -236,6 +236,9 @@ def test_effects_and_models_of_plug_ins_are_refused_by_name(tmp_path: Path) -> N
     sideways = Sideways(column="x", acts=Acts.FINE, coefficients=(1.0,), errors=(0.1,), reference=(0.0,))
     with pytest.raises(DriverProfileError, match="the C driver has no effect 'sideways'"):
         export_c(replace(base, effects=(sideways,)), tmp_path / "c")
+    held = made(Linear, 0.1, column="curvature", episode=0.001)
+    with pytest.raises(DriverProfileError, match="the C driver has no effect 'linear' whose last peak is held"):
+        export_c(replace(base, effects=(held,)), tmp_path / "c")
     assert not (tmp_path / "c").exists()
 
 

@@ -156,10 +156,13 @@ def _bent(column: Column, values: FloatArray, limits: Sequence[float] = LIMITS) 
             yield effects.Saturating(acts=Acts.LOCATION, column=name, middle=middle, scale=width * (high - low))
     if seen.min() < 0.0 < seen.max():
         yield effects.Magnitude(acts=Acts.LOCATION, column=name)
+        for size in np.unique(_quantiles(np.abs(seen), [share for share in limits if share >= 0.5])).tolist():
+            yield effects.Linear(acts=Acts.LOCATION, column=name, episode=size)
     for share in SCALES if column.gaps else ():
         if (scale := _scale(values, share)) > 0.0:
             yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale)
             yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=scale)
+            yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=scale, episode=float(np.exp(-1.0)))
 
 
 def _factors(column: Column, values: FloatArray) -> list[Factor]:

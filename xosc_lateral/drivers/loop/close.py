@@ -8,10 +8,10 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from xosc_lateral.drivers.loop.model import Description, Fitted, Term, fit_model
 from xosc_lateral.drivers.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.residual import LackOfFit, lack_of_fit_of, size_of
-from xosc_lateral.drivers.loop.selection import Accepted, Gain, Selection
+from xosc_lateral.drivers.loop.selection import UNFORESEEN, Accepted, Gain, Rejected, Selection, failed
 from xosc_lateral.drivers.loop.shown import Shown, what_drives_show
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms.between import between_shift
@@ -104,7 +104,7 @@ class LoopResult:
     identified: Identified  # Terms that are kept and those that are not, and the columns.
     scored: HeldOut  # Both profiles on held-out blocks.
     lack_of_fit: LackOfFit  # What is left.
-    remainder: Omnibus  # Whether any column predicts it.
+    remainder: Omnibus | None  # Whether any column predicts it; None: not known, for the check failed.
     explained: Explained | None  # Of what columns can explain, on held-out blocks; None: nothing can be held out.
     scores: Scorecard  # The ten metrics.
     shown: tuple[Shown, ...]  # What these drives can show.
@@ -187,7 +187,18 @@ def close_loop(
         refined = held_out.fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
-    rng = generator(root, LoopSeed.SNIPPETS)
+    closing = _Closing(identified)
+    explained = closing.kept("share of the explainable", lambda: _explained(setting, identified), None)
+    remainder = closing.kept(
+        "what is left", lambda: check_remainder(selection.final, identified.quantities, verdict), None
+    )
+    search, untested = identified.search, identified.usable.not_tested
+    shown = closing.kept(
+        "what these drives can show", lambda: what_drives_show(search, selection.final, untested), list[Shown]()
+    )
+    scores = held_out.score_runs(
+        timeline, scored.runs_before, scored.runs_after, setting.blocks, generator(root, LoopSeed.SNIPPETS)
+    )
     progress(1.0, "done")
     return LoopResult(
         base=base,
@@ -196,15 +207,35 @@ def close_loop(
         in_sample=is_given and in_sample,
         findings=tuple(findings),
         coarse=coarse,
-        identified=identified,
+        identified=closing.identified,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
-        explained=_explained(setting, identified),
-        remainder=check_remainder(selection.final, identified.quantities, verdict),
-        shown=tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
-        scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
+        explained=explained,
+        remainder=remainder,
+        shown=tuple(shown),
+        scores=scores,
         seed=seed,
     )
+
+
+T = TypeVar("T")
+
+
+@dataclass
+class _Closing:
+    """Closing words on what is identified: what fails stands among what was rejected, and costs no finding."""
+
+    identified: Identified
+
+    def kept(self, what: str, say: Callable[[], T], instead: T) -> T:
+        try:
+            return say()
+        except UNFORESEEN as error:
+            selection = self.identified.selection
+            fault = Rejected(what, (), 1.0, failed("it", error))
+            selection = replace(selection, rejected=(*selection.rejected, fault))
+            self.identified = replace(self.identified, selection=selection)
+            return instead
 
 
 def plan_loop(

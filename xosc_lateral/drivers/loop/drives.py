@@ -29,6 +29,8 @@ FEWEST_BETWEEN = 5  # Drives from which a column that is constant in each is tes
 # Slopes of drives on which nothing acts scatter by so many times their model's variance; fitted on 110 and 120 such
 # sets (the mean 2.05 and 2.16, the spread 1.65 and 2.31), worth so many drives.
 MEAN_INFLATION, SPREAD_INFLATION, PRIOR_DRIVES = 2.1, 1.65, 4.0
+# Rounds at most, and the share of the variance between drives that the last one may change it by. [-]
+ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 POWER_Z = 0.84  # Standard normal quantile of a power of 80 %.
 BOUND_Z = 1.645  # Of a one-sided bound of 95 %.
 
@@ -94,6 +96,28 @@ def slope_alike(rows: FloatArray, column: FloatArray, coarse: Coarse, inflation:
     return Pooled(mean, error, degrees, number, within)
 
 
+def left_of_drives(values: FloatArray, known: FloatArray, root: FloatArray) -> FloatArray:
+    """Values times their weights' roots, shape (drives,) each, free of what is known, shape (drives, k)."""
+    return beside(np.linalg.qr(known * root[:, None])[0], values * root)
+
+
+def weights_between(values: FloatArray, noise: FloatArray, known: FloatArray) -> FloatArray:
+    """One over the variance of drives' own values about what is known; inf as `noise`: of no account. Shape (drives,).
+
+    By Newton's method: the sum of squares falls and is convex in the variance, so rounds from zero approach its root
+    from below.
+    """
+    scatter, degrees = 0.0, max(int(np.isfinite(noise).sum()) - known.shape[1], 1)
+    for _ in range(ROUNDS):
+        weights = 1.0 / (scatter + noise)
+        squares = np.square(left_of_drives(values, known, np.sqrt(weights)))
+        change = (float(squares.sum()) - degrees) / max(float(squares @ weights), 1e-300)
+        if abs(change) <= VARIANCE_TOLERANCE * scatter or (change < 0.0 and scatter == 0.0):
+            break
+        scatter = max(scatter + change, 0.0)
+    return np.asarray(weights)
+
+
 def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled:
     """Slope of drives' own values on a column, shape (drives,) each; `noise`: variances. [unit of the values] per unit
 
@@ -101,17 +125,9 @@ def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled
     below the model's own.
     """
     design, degrees = np.column_stack([np.ones(len(values)), column - column.mean()]), len(values) - 2
-
-    def left(scatter: float) -> tuple[FloatArray, FloatArray]:
-        root = 1.0 / np.sqrt(noise + scatter)
-        return root, beside(np.linalg.qr(design * root[:, None])[0], values * root)
-
-    low, high = 0.0, float(np.ptp(values) ** 2) + 1e-300
-    for _ in range(60):  # the weighed squares fall with the scatter: bisection
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if float(np.sum(left(middle)[1] ** 2)) > degrees else (low, middle)
-    root, rest = left(high)
-    inverse = np.linalg.inv((design * root[:, None]).T @ (design * root[:, None]))
-    slope = float((inverse @ (design * root[:, None]).T @ (values * root))[1])
+    root = np.sqrt(weights_between(values, noise, design))
+    weighed, rest = design * root[:, None], left_of_drives(values, design, root)
+    inverse = np.linalg.inv(weighed.T @ weighed)
+    slope = float((inverse @ weighed.T @ (values * root))[1])
     factor = max(1.0, float(rest @ rest) / degrees)
     return Pooled(slope, float(np.sqrt(factor * inverse[1, 1])), degrees, len(values))

@@ -107,7 +107,7 @@ class Refinement:
         """Response at 1 Hz, standardised, shape (n, k), by the fine grid: at 1 Hz a lag is another filter."""
         timeline, shape = self._coarse.timeline, structs.replace(effect, lag_s=0.0, response_s=0.0)
         if shape not in self._quantities:
-            values = shape.response(timeline.step, self._coarse.context)
+            values = self._coarse.fine_response(shape)
             inside = values[timeline.valid]
             self._quantities[shape] = (values - inside.mean(axis=0)) / np.maximum(inside.std(axis=0), 1e-12)
         key = (shape, effect.response_s)

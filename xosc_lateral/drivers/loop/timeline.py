@@ -82,6 +82,12 @@ class Timeline:
         starts = np.searchsorted(self.drive, np.arange(len(self.names)))
         return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
+    def held(self, values: FloatArray, episode: float) -> FloatArray:
+        """Values, shape (n, k), with the peak of the last episode of each drive held; as they are where it is 0."""
+        if not episode:
+            return values
+        return np.concatenate([respond(values[rows], STEP, 0.0, 0.0, episode=episode) for rows in self.spans])
+
     def shifted(self, values: FloatArray, late_s: float) -> FloatArray:
         """Values so much later [s], shape (n, ...), in their unit; beyond a drive's ends its outermost value holds."""
         rows, edges = np.arange(len(values)), np.searchsorted(self.drive, np.arange(len(self.names) + 1))
@@ -247,7 +253,8 @@ class Coarse:
     def fine_response(self, effect: ColumnEffect) -> FloatArray:
         """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
         timeline, course = self.timeline, effect.course
-        response = timeline.respond(effect.known(self.context), effect.lag_s, effect.response_s)
+        quantity = timeline.held(effect.known(self.context), effect.episode)
+        response = timeline.respond(quantity, effect.lag_s, effect.response_s)
         return response if not course else np.sum([w * timeline.shifted(response, late) for late, w in course], axis=0)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:

@@ -223,8 +223,9 @@ def components_of(effect: kinds.ColumnEffect) -> list[tuple[Shape, ...]]:
 
     Raises `DriverProfileError` if C has no such effect: it is a plug-in's.
     """
-    if type(effect) not in kinds.EFFECTS:
-        raise DriverProfileError(f"the C driver has no effect {effect.kind!r}")
+    if type(effect) not in kinds.EFFECTS or effect.episode:
+        held = " whose last peak is held" if effect.episode else ""
+        raise DriverProfileError(f"the C driver has no effect {effect.kind!r}{held}")
     if isinstance(effect, kinds.Product):
         angles = (kinds.Form.SINE, kinds.Form.COSINE)
         at = [2.0 * np.pi / factor.at if factor.form in angles else factor.at for factor in effect.factors]

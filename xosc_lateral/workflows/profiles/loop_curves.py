@@ -76,13 +76,18 @@ def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> Floa
 def _fitted(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
     coarse = result.coarse
     context = {column: coarse.context[column][coarse.timeline.valid] for column in effect.columns}
-    seen = effect.seen(context)[:, 0] if isinstance(effect, Product) else context[effect.columns[0]]
+    seen = effect.seen(context)[:, 0] if _by_quantity(effect) else context[effect.columns[0]]
     seen = seen[np.isfinite(seen)]
     low, high = _ends(seen)
     over = np.linspace(low, high, 200)
-    quantity = over[:, None] if isinstance(effect, Product) else effect.quantity({effect.columns[0]: over})
+    quantity = over[:, None] if _by_quantity(effect) else effect.quantity({effect.columns[0]: over})
     about = quantity - np.asarray(effect.reference)
     return over, about @ np.asarray(effect.coefficients), np.sqrt(about**2 @ np.square(effect.errors))
+
+
+def _by_quantity(effect: ColumnEffect) -> bool:
+    """Whether a curve is over the quantity: of a product, or of what is held."""
+    return isinstance(effect, Product) or effect.episode > 0.0
 
 
 def _ends(values: FloatArray) -> tuple[float, float]:
@@ -95,7 +100,7 @@ def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, Floa
     """Column (or product) as the driver responds to it, where that can be said, and the effect's strength; at 1 Hz."""
     coarse = result.coarse
     strength = coarse.strength(effect)
-    if isinstance(effect, Product):
+    if _by_quantity(effect):
         return coarse_mean(coarse.fine_response(effect)[:, 0]), coarse_mean(strength)
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged

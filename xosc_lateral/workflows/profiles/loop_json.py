@@ -72,7 +72,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
             "clear": left.is_clear,
             "where": [group.name for group in left.where] if left.is_clear else [],
             "sentence": lack_of_fit_words(result),
-            "omnibus": asdict(result.remainder) | {"within_chance": result.remainder.silent},
+            "omnibus": result.remainder and asdict(result.remainder) | {"within_chance": result.remainder.silent},
         },
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}

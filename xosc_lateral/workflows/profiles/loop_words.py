@@ -241,7 +241,7 @@ def lack_of_fit_words(result: LoopResult) -> str:
         f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
         f"clearly above that between halves ({_mm(result.floor)}), and no effect was found that explains the rest."
         + (f" It stands out in: {where}." if where else "")
-        + ("" if result.remainder.silent else f" {_remainder_words(result)}")
+        + ("" if result.remainder is None or result.remainder.silent else f" {_remainder_words(result)}")
     )
 
 
@@ -262,6 +262,8 @@ def explained_words(result: LoopResult) -> str:
 def _remainder_words(result: LoopResult) -> str:
     """Whether any column predicts what is left, at whichever delay."""
     left, back = result.remainder, result.identified.taken_back
+    if left is None:
+        return f"Whether a column predicts what is left is not known: the check failed. {shown_words(result.shown)}"
     delays = f"from {-DELAYS[0]:g} s ahead to {DELAYS[-1]:g} s behind"
     if not left.silent:
         return (

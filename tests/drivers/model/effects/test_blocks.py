@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.kit.certified import FOLDER, contexts
-from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS
+from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS, made
 from tests.kit.profiles import whole_terms
 from xosc_lateral.drivers.model.effects import (
     EFFECTS,
@@ -17,6 +17,7 @@ from xosc_lateral.drivers.model.effects import (
     Effect,
     EffectTerms,
     HiddenEffect,
+    Linear,
     known_effects,
 )
 from xosc_lateral.drivers.model.effects.response import Response, ResponseState, respond
@@ -30,6 +31,7 @@ PROFILE = read_profile(FOLDER / "two-level-effects.json")
 EFFECTS_HERE: tuple[Effect, ...] = (
     *PROFILE.effects,
     *(effect for effect in EXAMPLES if effect.kind not in {there.kind for there in PROFILE.effects}),
+    made(Linear, 0.5, column="x", episode=0.8, response_s=1.3, lag_s=-0.5),
 )
 """The certified profile's, and one of each kind that version 0.1 did not have."""
 COLUMNED = {f"{k}-{effect.kind}": effect for k, effect in enumerate(EFFECTS_HERE) if effect.columns}

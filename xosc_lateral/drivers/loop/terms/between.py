@@ -18,8 +18,15 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.loop.dictionary import Search, beside
-from xosc_lateral.drivers.loop.drives import FEWEST_BETWEEN, Pooled, counted, regress
+from xosc_lateral.drivers.loop.dictionary import Search
+from xosc_lateral.drivers.loop.drives import (
+    FEWEST_BETWEEN,
+    Pooled,
+    counted,
+    left_of_drives,
+    regress,
+    weights_between,
+)
 from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, clipped_squares, design_of
 from xosc_lateral.drivers.loop.significance import MANY_DRIVES, NULL_DRAWS, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.drivers.loop.terms.column import ColumnTerm, of_kind
@@ -30,9 +37,6 @@ from xosc_lateral.drivers.model.seeds import generator
 # Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]
 USUAL_S = 60.0
 MIN_SECONDS = 10  # Of road-following in a drive that is counted. [s]
-# Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
-# squares falls and is convex in the variance, so that rounds from zero approach the root from below.
-ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 MIN_SUPPORT = 8.0  # A quantity that rests on fewer drives than this is not tested.
 # Share of either member's variance that the other of a pair must leave: below, the two are one quantity twice. [-]
 LEAST_APART = 0.1
@@ -104,7 +108,8 @@ class BetweenTerm(_DrivesTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Weighted least squares over drives, all such terms jointly."""
         sizes, errors = _Places.of(fitted).sizes()
-        is_self = [term is self for term in of_kind(fitted, BetweenTerm)]
+        widths = {term: fitted.coarse.response(term.effect).shape[1] for term in of_kind(fitted, BetweenTerm)}
+        is_self = np.repeat([term is self for term in widths], list(widths.values()))
         return (self.sized(fitted.coarse, Acts.LOCATION, sizes[is_self], errors[is_self]),)
 
 
@@ -200,30 +205,20 @@ class _Places:
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
-        """Weights at which weighed squares add up to their degrees of freedom (Paule, Mandel 1982), by Newton."""
+        """With what is known of them, and how well."""
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power
         counted = (seconds >= MIN_SECONDS) & (power > 0.0)
         noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
-        usual = [coarse.by_drive(coarse.response(term.effect)[:, 0]) for term in of_kind(fitted, BetweenTerm)]
+        responses = (coarse.response(term.effect) for term in of_kind(fitted, BetweenTerm))
+        usual = [coarse.by_drive(part) for response in responses for part in response.T]
         known = np.column_stack([np.ones(groups), *usual])
-        scatter = 0.0
-        for _ in range(ROUNDS):
-            places = cls(fitted.levels, np.where(counted, 1.0 / (scatter + noise), 0.0), known)
-            squares = np.square(places.left(fitted.levels))
-            excess = float(squares.sum()) - max(int(counted.sum()) - known.shape[1], 1)
-            change = excess / max(float(squares @ places.weight), 1e-300)
-            settled = abs(change) <= VARIANCE_TOLERANCE * scatter or (change < 0.0 and scatter == 0.0)
-            scatter = max(scatter + change, 0.0)
-            if settled:
-                break
-        return places
+        return cls(fitted.levels, weights_between(fitted.levels, noise, known), known)
 
     def left(self, values: FloatArray) -> FloatArray:
         """Times the weight's root, free of what is known; shape (drives,)."""
-        root = np.sqrt(self.weight)
-        return beside(np.linalg.qr(self.known * root[:, None])[0], values * root)
+        return left_of_drives(values, self.known, np.sqrt(self.weight))
 
     def sizes(self) -> tuple[FloatArray, FloatArray]:
         """Sizes of the known effects and their standard errors, shape (k,) each. [m] per unit"""

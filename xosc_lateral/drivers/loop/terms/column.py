@@ -121,6 +121,10 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
     """Quantity, shape (k,), at the 5 % and 95 % quantile of column, product or strength, or its extremes."""
     inside = coarse.timeline.valid
+    if effect.episode:
+        held = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0))
+        low, high = _ends(held[inside, 0])[:, None]
+        return low, high
     if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
         seen = coarse.context[effect.column][inside]
         ends = _ends(seen[np.isfinite(seen)])

@@ -84,7 +84,7 @@ class MeanTerm(SearchedTerm):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change over the driving range; of one column also what the car does in a typical passage."""
         described, effect = super().describe(fitted, effects, key), effects[0]
-        if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular):
+        if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
             return described
         share = described.size_error / max(abs(described.size_m), 1e-12)
         return replace(described, passage=passage_of(fitted.coarse, effect, share))
@@ -231,7 +231,7 @@ class CourseTerm(MeanTerm):
     @classmethod
     def over_time(cls, effect: ColumnEffect, sizes: FloatArray) -> CourseTerm:
         """A term of an effect's column in its shape, its components in proportion to their sizes, shape (k,)."""
-        timed = structs.replace(effect, lag_s=0.0, response_s=RESPONSE_S, response_order=1, course=())
+        timed = structs.replace(effect, lag_s=0.0, response_s=RESPONSE_S, response_order=1, course=(), episode=0.0)
         mix = sizes / max(float(np.abs(sizes).max()), 1e-300)
         return replace(cls.of(timed), mix=tuple(mix.tolist()))
 

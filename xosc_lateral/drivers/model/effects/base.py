@@ -121,7 +121,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     deviation is negative, or the order is not 1 to 9.
     """
 
-    later = ("between_drivers", "response_range", "response_order", "course")
+    later = ("between_drivers", "response_range", "response_order", "course", "episode")
 
     # For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ...
     words: ClassVar[str] = ""
@@ -143,6 +143,9 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     # Further delay [s] and weight [-] of each of several shifts in time that the response is the sum of, where one
     # delay does not do: into a bend, through it and out. Empty: one of weight 1.
     course: tuple[tuple[float, float], ...] = ()
+    # Size of the quantity beyond which its peak is held until the next time: the last bend, the last vehicle overtaken.
+    # 0: nothing is held. [unit of the quantity]
+    episode: float = 0.0
 
     def __post_init__(self) -> None:
         tuples = ("coefficients", "errors", "reference", "between_drivers")
@@ -173,6 +176,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         for limit, value in ((RESPONSE, latest), (COURSE, len(self.course))):
             if value > limit.value:
                 raise DriverProfileError(f"effect {self.kind}: {limit.refusal(value)}")
+        if not 0.0 <= self.episode < np.inf:
+            raise DriverProfileError(f"effect {self.kind}: episode {self.episode} must be 0 or more")
         ranges = tuple((float(low), float(high)) for low, high in self.response_range)
         set_once(self, response_range=ranges)
         if ranges and (
@@ -193,7 +198,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     @property
     def shape(self) -> str:
         """Word for the report: linear, threshold, saturating, product, levels, angular ..."""
-        return self.words.format(self)
+        held = f", the last peak beyond {self.episode:.3g} held" if self.episode else ""
+        return f"{self.words.format(self)}{held}"
 
     @abstractmethod
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
@@ -242,7 +248,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     def response(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
         known, order = self.known(context), self.response_order
-        return respond(known, step, self.lag_s, self.response_s, order=order, course=self.course)
+        timing = (known, step, self.lag_s, self.response_s)
+        return respond(*timing, order=order, course=self.course, episode=self.episode)
 
     def response_in_blocks(self, step: float, state: ResponseState | None = None, *, delay: int = 0) -> Response:
         """The response block by block, shape (n, k) each, from the start of a drive or from a state.
@@ -250,7 +257,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         `step` in [s], `delay` in steps: see `Response`.
         """
         timing = {"order": self.response_order, "delay": delay}
-        return Response(step, self.lag_s, self.response_s, state, **timing, course=self.course)
+        return Response(step, self.lag_s, self.response_s, state, **timing, course=self.course, episode=self.episode)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import reduce
+from itertools import pairwise
 from operator import add
 
 import msgspec
@@ -25,19 +26,21 @@ class ResponseState(msgspec.Struct):
     held: FloatArray | None = None  # Last rows of the quantity, as far back as they are still needed, shape (m, k).
     taken: int = 0  # Rows of the quantity seen.
     given: int = 0  # Rows of the response given.
-    settled: FloatArray | None = None  # Last response of each first-order lag, shape (order * k,).
+    # Last response of each first-order lag, then peak and last row of an episode, shape (order * k,), (2 * k,).
+    settled: FloatArray | None = None
 
 
 class Response:
     """A shift in time, then equal first-order lags of gain 1 one after the other, of a quantity given block by block.
 
-    Or a weighted sum of shifts in place of the one: a course over time.
+    Or a weighted sum of shifts in place of the one: a course over time. What is shifted may be held: from where it is
+    beyond `episode` to either side its peak so far, until it is there again.
 
     Row i of the response is due once all rows of its preview were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
 
-    Of an even grid of a `step` [s]; `lag_s`, `response_s`, `order` and `course` as in `ColumnEffect`; `delay`: rows
-    that everything comes later by, for who doesn't know what lies ahead.
+    Of an even grid of a `step` [s]; `lag_s`, `response_s`, `order`, `course` and `episode` as in `ColumnEffect`;
+    `delay`: rows that everything comes later by, for who doesn't know what lies ahead.
     """
 
     def __init__(
@@ -50,9 +53,10 @@ class Response:
         order: int = 1,
         delay: int = 0,
         course: Sequence[tuple[float, float]] = (),
+        episode: float = 0.0,
     ) -> None:
         self.state = ResponseState() if state is None else state
-        self._order = order
+        self._order, self._episode = order if response_s > 0 else 0, episode
         shifts = [(*split_shift((lag_s + late) / step), weight) for late, weight in course or [(0.0, 1.0)]]
         self._shifts = [(whole - delay, share, weight) for whole, share, weight in shifts]
         self._earliest = min(whole for whole, _, _ in self._shifts)
@@ -96,6 +100,8 @@ class Response:
     def _single(self, held: FloatArray, row: int) -> FloatArray:
         """One row of the response, by the operations of many, without their cost; shape (1, k)."""
         value = reduce(add, (weight * self._row(held, row + whole, share) for whole, share, weight in self._shifts))
+        if self._episode:
+            return self._lagged(np.array(value[None, :]))
         if self._keep is not None:
             settled = self._settled(value)
             for lagged in settled.reshape(self._order, -1):
@@ -129,20 +135,47 @@ class Response:
         return result
 
     def _lagged(self, values: FloatArray) -> FloatArray:
-        """First-order lags, in place."""
-        if self._keep is None or not len(values):
+        """Holds and first-order lags, in place."""
+        if not (self._order or self._episode) or not len(values):
             return values
-        settled, keep = self._settled(values[0]), np.array([self._keep])
-        for lagged in settled.reshape(self._order, -1):
+        settled, keep = self._settled(values[0]), 0.0 if self._keep is None else self._keep
+        rows = settled.reshape(-1, values.shape[1])
+        if self._episode:
+            peak, last = rows[-2:]
+            for k, column in enumerate(values.T):
+                now = column[-1]
+                column[:] = hold_peaks(column, self._episode, peak[k], last[k])
+                peak[k], last[k] = column[-1], now
+        for lagged in rows[: self._order]:
             for k in range(values.shape[1]):
-                values[:, k] = recur(lagged[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
+                values[:, k] = recur(lagged[k : k + 1], (1.0 - keep) * values[:, k], np.array([keep]))[1:]
             lagged[:] = values[-1]
         self.state.settled = settled
         return values
 
     def _settled(self, value: FloatArray) -> FloatArray:
         """Where each lag is, as an array of its own; at the start, at the value."""
-        return np.tile(value, self._order) if self.state.settled is None else np.array(self.state.settled)
+        number = self._order + (2 if self._episode else 0)
+        return np.tile(value, number) if self.state.settled is None else np.array(self.state.settled)
+
+
+def hold_peaks(values: FloatArray, beyond: float, peak: float, last: float) -> FloatArray:
+    """Signed peak so far of the episode that goes on, else of the last, shape (n,), in the unit of the values.
+
+    An episode is a stretch `beyond` a size, to one side; `peak` and `last` are what is held and the value just before.
+    """
+    before, *sides = np.where(np.abs([last, *values]) > beyond, np.sign([last, *values]), 0.0).tolist()
+    edges = np.flatnonzero(np.diff([before, *sides]))
+    held = np.empty(len(values))
+    for first, end in pairwise(dict.fromkeys((0, *edges.tolist(), len(values)))):
+        side, so_far = sides[first], peak if first == 0 and sides[0] == before else 0.0
+        if side:
+            so_far = side * so_far
+            held[first:end] = side * np.maximum.accumulate(np.maximum(side * values[first:end], so_far))
+            peak = float(held[end - 1])
+        else:
+            held[first:end] = peak
+    return held
 
 
 def respond(
@@ -153,12 +186,13 @@ def respond(
     *,
     order: int = 1,
     course: Sequence[tuple[float, float]] = (),
+    episode: float = 0.0,
 ) -> FloatArray:
     """Response to a whole drive's finite values, even in time, shape (n,) or (n, k), in their unit; see `Response`."""
     values = np.asarray(values, dtype=np.float64)
     if not len(values):
         return values.copy()
-    response = Response(step, lag_s, response_s, order=order, course=course)
+    response = Response(step, lag_s, response_s, order=order, course=course, episode=episode)
     return response.finish(values.reshape(len(values), -1)).reshape(values.shape)
 
 
