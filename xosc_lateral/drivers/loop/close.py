@@ -187,18 +187,8 @@ def close_loop(
         refined = held_out.fit_refined(selection.final, setting.refined_kind, name, provenance, began_with)
     findings = [describe_finding(*one, selection.final, scored) for one in _accepted(selection)]
     findings += [_finding(lack.described(), scored, kind=lack.KIND, p_value=lack.p_value) for lack in lacks]
-    closing = _Closing(identified)
-    explained = closing.kept("share of the explainable", lambda: _explained(setting, identified), None)
-    remainder = closing.kept(
-        "what is left", lambda: check_remainder(selection.final, identified.quantities, verdict), None
-    )
-    search, untested = identified.search, identified.usable.not_tested
-    shown = closing.kept(
-        "what these drives can show", lambda: what_drives_show(search, selection.final, untested), list[Shown]()
-    )
-    scores = held_out.score_runs(
-        timeline, scored.runs_before, scored.runs_after, setting.blocks, generator(root, LoopSeed.SNIPPETS)
-    )
+    faults: list[Rejected] = []
+    rng = generator(root, LoopSeed.SNIPPETS)
     progress(1.0, "done")
     return LoopResult(
         base=base,
@@ -207,13 +197,20 @@ def close_loop(
         in_sample=is_given and in_sample,
         findings=tuple(findings),
         coarse=coarse,
-        identified=closing.identified,
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
-        explained=explained,
-        remainder=remainder,
-        shown=tuple(shown),
-        scores=scores,
+        scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
+        explained=_closing(faults, "share of the explainable", lambda: _explained(setting, identified), None),
+        remainder=_closing(
+            faults, "what is left", lambda: check_remainder(selection.final, identified.quantities, verdict), None
+        ),
+        shown=_closing(
+            faults,
+            "what these drives can show",
+            lambda: tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
+            (),
+        ),
+        identified=replace(identified, selection=replace(selection, rejected=(*selection.rejected, *faults))),
         seed=seed,
     )
 
@@ -221,21 +218,13 @@ def close_loop(
 T = TypeVar("T")
 
 
-@dataclass
-class _Closing:
-    """Closing words on what is identified: what fails stands among what was rejected, and costs no finding."""
-
-    identified: Identified
-
-    def kept(self, what: str, say: Callable[[], T], instead: T) -> T:
-        try:
-            return say()
-        except UNFORESEEN as error:
-            selection = self.identified.selection
-            fault = Rejected(what, (), 1.0, failed("it", error))
-            selection = replace(selection, rejected=(*selection.rejected, fault))
-            self.identified = replace(self.identified, selection=selection)
-            return instead
+def _closing(faults: list[Rejected], what: str, say: Callable[[], T], instead: T) -> T:
+    """A closing word; one that fails stands among what was rejected, and costs no finding."""
+    try:
+        return say()
+    except UNFORESEEN as error:
+        faults.append(Rejected(what, (), 1.0, failed("it", error)))
+        return instead
 
 
 def plan_loop(

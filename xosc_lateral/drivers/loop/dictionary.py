@@ -60,8 +60,7 @@ class Quantities:
         """Evaluate all; those that never vary on valid seconds are left out."""
         kept, rows = [], []
         for candidate in candidates:
-            effect = candidate.effect
-            quantity = timeline.held(candidate.values(context)[:, None], effect.episode)[:, 0]
+            quantity = timeline.held(candidate.values(context)[:, None], candidate.effect.episode)[:, 0]
             there = quantity[timeline.valid & np.isfinite(quantity)]
             # what is unknown takes the mean of what is known and valid
             second = coarse_mean(np.where(np.isnan(quantity), there.mean() if len(there) else 0.0, quantity))

@@ -363,8 +363,7 @@ def nest(
 
 
 def _without(selection: Selection, leave_out: Callable[[Term], bool]) -> Selection:
-    extra = [one.term for one in selection.accepted if leave_out(one.term)]
-    return selection.without(extra, "") if extra else selection
+    return selection.without([one.term for one in selection.accepted if leave_out(one.term)], "")
 
 
 def _any_matches(term: Term, others: Sequence[Term]) -> bool:

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -76,6 +76,15 @@ class Description:
     response_s: float | None = None
     static_gain: float | None = None  # What it would be if what drives it stayed: [m]; factor for scale.
     passage: Passage | None = None  # The path through a typical bend, say.
+
+
+E = TypeVar("E", bound=Effect)
+
+
+def proper(effects: Sequence[Effect], kind: type[E]) -> E:
+    """The effect proper of what a term's `estimate` gave."""
+    assert isinstance(effects[0], kind)
+    return effects[0]
 
 
 @dataclass(frozen=True, eq=False)

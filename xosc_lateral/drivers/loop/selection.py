@@ -105,6 +105,8 @@ class Selection:
 
     def without(self, terms: Sequence[Term], why: str) -> Selection:
         """Less some accepted terms, fitted again."""
+        if not terms:
+            return self
         gone = {id(term) for term in terms}
         out = [one for one in self.accepted if id(one.term) in gone]
         taken_back = (Rejected(one.term.component, one.term.columns, one.p_value, why, was_found=True) for one in out)
@@ -165,7 +167,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             selection = selection.without([candidate.term], failed("its second test", error))
     selection = _that_can_be_told(selection)
     undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
-    return selection.without(undone, UNDONE) if undone else selection
+    return selection.without(undone, UNDONE)
 
 
 def failed(what: str, error: Exception) -> str:

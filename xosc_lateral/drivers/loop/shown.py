@@ -55,12 +55,9 @@ def what_drives_show(search: Search, fitted: Fitted, untested: dict[str, str], *
     for kind in (MeanTerm, spread.SpreadTerm):
         shown += _of_columns(search, fitted, kind)
     shown += [*_of_whole_drives(search, fitted), *_of_time(search, fitted)]
-    return [_without_bound(one) for one in shown] if plan else shown
-
-
-def _without_bound(shown: Shown) -> Shown:
-    why = "would be tested" if shown.tested else shown.why
-    return replace(shown, why=why, bound=None)
+    if not plan:
+        return shown
+    return [replace(one, why="would be tested" if one.tested else one.why, bound=None) for one in shown]
 
 
 def _entry(fitted: Fitted, what: str, acts: str, why: str, smallest: float, bound: float) -> Shown:

@@ -76,13 +76,16 @@ class BetweenTerm(_DrivesTerm):
         present = {name for term in of_kind(fitted, cls) for name in term.columns}
         candidates, usual = [], []
         for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
-            if len(candidate.columns) > 1 or len(candidate.contrast) > 1 or present & set(candidate.columns):
-                continue
-            if isinstance(candidate.effect, Linear) and search.columns[candidate.columns[0]].gaps:
+            if (
+                len(candidate.columns) > 1
+                or len(candidate.contrast) > 1
+                or present & set(candidate.columns)
                 # a line in a distance would set a neighbour who is far away apart from one who is gone
+                or (isinstance(candidate.effect, Linear) and search.columns[candidate.columns[0]].gaps)
+                # it would say which drive it is
+                or missing_throughout(coarse.context[candidate.columns[0]], coarse.timeline).any()
+            ):
                 continue
-            if missing_throughout(coarse.context[candidate.columns[0]], coarse.timeline).any():
-                continue  # it would say which drive it is
             mean = places.left(coarse.by_drive(values.astype(np.float64)))
             power = float(mean @ mean)
             if power > 1e-12 and power**2 / max(float(np.sum(mean**4)), 1e-300) >= MIN_SUPPORT:

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.loop.model import Description, Fitted, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Term, proper
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.timeline import Coarse
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear, Piecewise, Saturating, Threshold
@@ -46,13 +46,11 @@ class ColumnTerm(Term):
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
         """What it does."""
-        assert isinstance(effects[0], ColumnEffect)
-        return coarse.strength(effects[0])
+        return coarse.strength(proper(effects, ColumnEffect))  # type: ignore[type-abstract]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change of the expected path between its own 5 % and 95 % quantile; and of what would stay for good."""
-        effect = effects[0]
-        assert isinstance(effect, ColumnEffect)
+        effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
         static = span(fitted.coarse, effect)
         strength = on_path(fitted.coarse, effect)
         sizes, errors = np.asarray(effect.coefficients), np.asarray(effect.errors)
@@ -121,17 +119,13 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
     """Quantity, shape (k,), at the 5 % and 95 % quantile of column, product or strength, or its extremes."""
     inside = coarse.timeline.valid
-    if effect.episode:
-        held = coarse.fine_response(structs.replace(effect, lag_s=0.0, response_s=0.0))
-        low, high = _ends(held[inside, 0])[:, None]
-        return low, high
-    if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
+    if isinstance(effect, Linear | Threshold | Saturating | Piecewise) and not effect.episode:
         seen = coarse.context[effect.column][inside]
         ends = _ends(seen[np.isfinite(seen)])
         low, high = effect.quantity({effect.column: ends})
         if np.any(low != high):
             return low, high
-    quantity = effect.seen({column: coarse.context[column][inside] for column in effect.columns})
+    quantity = coarse.timeline.held(effect.seen(coarse.context), effect.episode)[inside]
     quantity = quantity[np.isfinite(quantity).all(axis=1)]
     if quantity.shape[1] == 1:
         low, high = _ends(quantity[:, 0])[:, None]

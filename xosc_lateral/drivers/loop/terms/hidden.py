@@ -26,7 +26,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.lazy import njit
 from xosc_lateral.drivers.loop.dictionary import Search, beside
 from xosc_lateral.drivers.loop.drives import counted
-from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term
+from xosc_lateral.drivers.loop.model import Description, Fitted, Outcome, Stage, Term, proper
 from xosc_lateral.drivers.loop.residual import OSCILLATION
 from xosc_lateral.drivers.loop.significance import HEAVY_TAIL_SHARE, LoopSeed, in_another_order, upper_tail
 from xosc_lateral.drivers.loop.terms import spread
@@ -158,18 +158,17 @@ class RegimesTerm(Term):
 
     def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """By the probability that the loud regime is on."""
-        effect = effects[0]
-        assert isinstance(effect, Regimes)
+        effect = proper(effects, Regimes)
         on = on_fine_grid(self.fit.on, fitted.coarse.timeline)
         return [(Acts.SPREAD, on * np.log(effect.factor)), (Acts.FINE, on * np.log(effect.fine_factor))]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor and mean lengths."""
-        effect = effects[0]
-        assert isinstance(effect, Regimes)
+        effect = proper(effects, Regimes)
         shape = f"on for {effect.on_s:.0f} s, off for {effect.off_s:.0f} s on average"
-        statistic = "quantiles of local spread"
-        return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic)
+        return Description(
+            "on/off regimes", shape, effect.factor, effect.factor_error, statistic="quantiles of local spread"
+        )
 
 
 def probability_of_persistence(
@@ -248,15 +247,17 @@ class CycleTerm(Term):
         sizes, errors = fitted.sizes[part], np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         power = max(float(np.sum(sizes**2) - np.sum(errors**2)) / coarse.drives, 1e-8)
         seconds = float(coarse.valid.sum()) / coarse.drives
-        coherence = 1e6 if self.width == 1 else seconds / (np.pi * self.width)
+        coherence = 1e6 if self.width == 1 else float(seconds / (np.pi * self.width))
         amplitude, error = float(np.sqrt(power)), float(np.sqrt(np.mean(errors**2)))
-        period = 1.0 / self.frequency
-        return (Cycle(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
+        return (
+            Cycle(
+                amplitude=amplitude, amplitude_error=error, period_s=1.0 / self.frequency, coherence_s=float(coherence)
+            ),
+        )
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Amplitude and period."""
-        effect = effects[0]
-        assert isinstance(effect, Cycle)
+        effect = proper(effects, Cycle)
         shape = f"period {effect.period_s:.1f} s"
         return Description("weave", shape, effect.amplitude, effect.amplitude_error, OSCILLATION)
 

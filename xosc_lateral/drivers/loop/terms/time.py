@@ -29,7 +29,7 @@ from xosc_lateral.drivers.loop.drives import (
     own_time,
     slope_alike,
 )
-from xosc_lateral.drivers.loop.model import CLIP, Description, Fitted, Outcome, Stage, Term, fit_model
+from xosc_lateral.drivers.loop.model import CLIP, Description, Fitted, Outcome, Stage, Term, fit_model, proper
 from xosc_lateral.drivers.loop.refinement import Alternatives
 from xosc_lateral.drivers.loop.significance import LoopSeed
 from xosc_lateral.drivers.loop.terms import spread
@@ -141,8 +141,7 @@ class StepTerm(_MeanByTime):
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Height and moment."""
-        effect = effects[0]
-        assert isinstance(effect, Step)
+        effect = proper(effects, Step)
         name, shape = _named("step", self.others, f"at {effect.at_s:.0f} s")
         return Description(name, shape, effect.size, effect.size_error, f"mean by effect: {key}")
 
@@ -172,8 +171,8 @@ class TimeMeanTerm(_MeanByTime):
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
         """The curve."""
-        assert isinstance(effects[0], TimeSmooth)
-        return effects[0].path(effects[0].location, coarse.timeline.time)
+        effect = proper(effects, TimeSmooth)
+        return effect.path(effect.location, coarse.timeline.time)
 
     def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """As the profile has it."""
@@ -182,8 +181,7 @@ class TimeMeanTerm(_MeanByTime):
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between its extremes, in the order of time."""
-        effect = effects[0]
-        assert isinstance(effect, TimeSmooth)
+        effect = proper(effects, TimeSmooth)
         size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
         name, shape = _named(self.form, self.others, shape.removeprefix("smooth, "))
         return Description(
@@ -275,19 +273,17 @@ class TimeSpreadTerm(Term):
 
     def quantity(self, coarse: Coarse, effects: tuple[Effect, ...]) -> FloatArray:
         """The curve of the spread."""
-        assert isinstance(effects[0], TimeSmooth)
-        return effects[0].path(effects[0].spread, coarse.timeline.time)
+        effect = proper(effects, TimeSmooth)
+        return effect.path(effect.spread, coarse.timeline.time)
 
     def removed(self, fitted: Fitted, effects: tuple[Effect, ...]) -> Sequence[tuple[Acts, FloatArray]]:
         """A plain function of time."""
-        assert isinstance(effects[0], TimeSmooth)
-        fine = effects[0].path(effects[0].fine, fitted.coarse.timeline.time)
-        return [(Acts.SPREAD, self.quantity(fitted.coarse, effects)), (Acts.FINE, fine)]
+        effect, time = proper(effects, TimeSmooth), fitted.coarse.timeline.time
+        return [(Acts.SPREAD, effect.path(effect.spread, time)), (Acts.FINE, effect.path(effect.fine, time))]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor between its extremes, in the order of time."""
-        effect = effects[0]
-        assert isinstance(effect, TimeSmooth)
+        effect = proper(effects, TimeSmooth)
         size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
         factor = float(np.exp(size))
         return Description("spread by time", shape, factor, factor * error, f"spread by effect: {key}")
