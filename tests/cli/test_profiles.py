@@ -14,7 +14,7 @@ from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.profiles.profiles import add_profile
 
-BASES = ("motorway", "motorway-vehicle-6", "motorway-vehicle-2", "motorway-vehicle-3")
+BASES = ("motorway", "motorway-vehicle-5", "motorway-vehicle-2", "motorway-vehicle-3")
 
 
 @pytest.fixture(scope="module")
