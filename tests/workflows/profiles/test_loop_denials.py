@@ -17,12 +17,12 @@ from xosc_lateral.drivers.loop.close import LoopResult, close_loop
 from xosc_lateral.workflows.profiles.loop_json import loop_record
 from xosc_lateral.workflows.profiles.loop_words import outcome
 
-KEPT = ("truck_right", "speed", "time", "distance_left", "distance_right", "lane_index")
+COLUMNS = ("truck_right", "speed", "time", "distance_left", "distance_right", "lane_index")
 
 
 def drive(seed: int, seconds: float, *effects: Any, **columns: float) -> Drive:
     table = simulate_drive(seconds, seed, driver=Driver(), effects=effects).table
-    table = table.drop(columns=[name for name in CONTEXT_UNITS if name in table and name not in KEPT])
+    table = table.drop(columns=[name for name in CONTEXT_UNITS if name in table and name not in COLUMNS])
     return as_drive(table.assign(**columns), f"drive-{seed}")
 
 

@@ -161,8 +161,8 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             fitted = test.after or fit_model(search.coarse, (*fitted.terms, *new))
     # a column that was found is not among what was not, over time or in slow movement, say
     known = {(alike.component, one.term.columns) for one in accepted for alike in TERMS if alike.asks_as(one.term)}
-    failing = (one for one in rejected.values() if (one.component, one.columns) not in known)
-    selection = Selection(tuple(accepted), tuple(failing), start, fitted)
+    failing = tuple(rest for rest in rejected.values() if (rest.component, rest.columns) not in known)
+    selection = Selection(tuple(accepted), failing, start, fitted)
     for candidate in accepted:
         try:
             selection = _tested_again(search, selection, candidate)
