@@ -1,6 +1,7 @@
 """Live against played, over everything: each scenario in the reference player's library, with drivers and without.
 
     python -m laboratory.live_everywhere SCENARIO_OR_FOLDER... --library libesminiLib.so [--catalog FILE] [--csv FILE]
+        [--written]
 
 Once with nobody else, and once, where there is an entity `Ego`, with an ego that somebody drives: it brakes to a stop
 after a second, stands for two, and goes on. `--catalog` adds a scenario for every vehicle of a catalog, which changes
@@ -12,7 +13,8 @@ lanes before an ego, beside a car that stands. Per vehicle that a driver of ours
 - a: its largest acceleration across its played path, at 20 Hz. [m/s2]
 - off: steps on no road, more than played.
 
-Per scenario: events of the storyboard that are lost, and new ones.
+Per scenario: events of the storyboard that are lost, and new ones. With `--written` live runs are compared not with the
+scenario as it is, but with what `convert --ego Ego` makes of it, under the same ego.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from lxml import etree
 from numpy.typing import NDArray
 
 import xosc_lateral as xl
+from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.live.esmini import EsminiTraffic
 from xosc_lateral.workflows.live.esmini_library import Player, open_player
 
@@ -44,6 +47,7 @@ NO_ROAD, LEAP = 2**32 - 1, 4.0
 COLUMNS = ["time", "name", "x", "y", "h", "speed", "road", "lane", "steered"]
 WAY, MOVED, HARD, STANDING = 0.1, 0.01, 1.0, 0.01
 """What is asked [m], [m], [m/s2]; slower all the time than this, somebody stands. [m/s]"""
+COMPARED = ["scenario", "ego", "vehicle", "way", "moved", "lane", "a", "a_beside", "off"]
 HEAD = ("ego", "scenarios", "vehicles", "events lost, new", f"way > {WAY} m", "other lane", "stands, and is moved",
         f"a more than {HARD:g} m/s2 beyond played", "off the road")  # fmt: skip
 
@@ -101,7 +105,8 @@ def play(library: Path, scenario: Path, *, drivers: bool, ego: bool, seconds: fl
         events[path.decode(errors="replace"), state] += 1
 
     profile = xl.read_profile("motorway")
-    traffic = EsminiTraffic(player, scenario, profile, ego="Ego" if ego else (), seed=seed, on_element=note)
+    model = read_scenario(scenario, allowed=[Path(scenario.anchor)])
+    traffic = EsminiTraffic(player, model, profile, ego="Ego" if ego else (), seed=seed, on_element=note)
     driven = None
     if ego:
         one = traffic.states()["Ego"]
@@ -163,11 +168,14 @@ class Compared:
     notes: list[str] = field(default_factory=list)
 
 
-def compare(name: str, ego: str, plain: Run, live: Run) -> Compared:
-    """What is other with drivers."""
+def compare(name: str, ego: str, plain: Run, live: Run, *, written: bool = False) -> Compared:
+    """What is other with drivers; events that a written scenario has in other words are no difference."""
     result = Compared(name, ego, notes=live.warnings)
-    result.lost = sum((plain.events - live.events).values())
-    result.new = sum((live.events - plain.events).values())
+    both_have = {path for path, _ in plain.events} & {path for path, _ in live.events}
+    lost, new = plain.events - live.events, live.events - plain.events
+    result.lost, result.new = (
+        sum(n for (path, _), n in more.items() if path in both_have or not written) for more in (lost, new)
+    )
     before = dict(tuple(plain.rows.groupby("name")))
     for who, after in live.rows.groupby("name"):
         if not after["steered"].any() or who not in before:
@@ -252,6 +260,16 @@ def of_catalog(catalog: Path, folder: Path) -> Iterator[tuple[str, Path]]:
         yield f"catalog: {entry}", own / f"{entry}.xosc"
 
 
+def written(scenario: Path, folder: Path, seed: int) -> Path | None:
+    """What is made of a scenario; None: nothing can be."""
+    output = folder / f"written_{scenario.parent.name}_{scenario.name}"
+    try:
+        xl.convert(scenario, output, ego=["Ego"], seed=seed, force=True)
+    except xl.XoscLateralError:
+        return None
+    return output
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -261,6 +279,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--minutes", type=float, default=1e3, help="what is not reached by then is counted as left out")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--written", action="store_true", help="compare with converted scenarios")
     parser.add_argument("--csv", type=Path)
     given = parser.parse_args()
     found: list[Compared] = []
@@ -278,18 +297,21 @@ def main() -> None:
                     apart["left out: no time"] += 1
                     continue
                 how = {"ego": ego != "nobody", "seconds": given.seconds, "seed": given.seed}
-                plain, live = (played(given.library, path, drivers=drivers, **how) for drivers in (False, True))
+                source = written(path, Path(folder), given.seed) if given.written else path
+                plain = None if source is None else played(given.library, source, drivers=False, **how)
+                live = played(given.library, path, drivers=True, **how)
                 if plain is None or live is None:
                     apart["not played without drivers" if plain is None else f"not with drivers: {name}"] += 1
                     continue
-                found.append(compare(name, ego, plain, live))
+                found.append(compare(name, ego, plain, live, written=given.written))
                 for line in _remarkable(found[-1]):
                     print(line, flush=True)
-    vehicles = pd.DataFrame([row for one in found for row in one.vehicles])
+    vehicles = pd.DataFrame([row for one in found for row in one.vehicles], columns=COMPARED)
     if given.csv is not None:
         vehicles.to_csv(given.csv, index=False)
     print(f"\n| {' | '.join(HEAD)} |\n|{'---|' * len(HEAD)}")
-    for ego, rows in vehicles.groupby("ego"):
+    for ego in ("brakes", "nobody"):
+        rows = vehicles[vehicles["ego"] == ego]
         own = [one for one in found if one.ego == ego]
         counts = (rows["way"] > WAY, rows["lane"], rows["moved"] > MOVED, hard(rows), rows["off"] > 0)
         events = f"{sum(one.lost for one in own)}, {sum(one.new for one in own)}"

@@ -51,7 +51,7 @@ def test_names_are_not_vague() -> None:
         for name, line in [(path.stem, 0), *_named(TREES[path])]
         if name.strip("_").lower() in VAGUE
     ]
-    assert not vague
+    assert not vague, "\n".join(vague)
 
 
 # ---- names inside functions ----
@@ -79,7 +79,7 @@ def test_local_names_are_no_riddles() -> None:
         for name, line in _local_names(TREES[path])
         if name.strip("_") in RIDDLES and (path.name, name) not in STORED
     ]
-    assert not riddles
+    assert not riddles, "\n".join(riddles)
 
 
 # ---- names in docstrings and comments ----

@@ -49,6 +49,7 @@ def test_nothing_is_loaded_to_say_what_there_is(words: list[str], tmp_path: Path
         "base.version",
         "cli",
         "files",
+        "files.held",
         "files.source",
     }
     assert own == {f"xosc_lateral.{name}" for name in light}

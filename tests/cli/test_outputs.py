@@ -43,9 +43,9 @@ def _files(folder: Path) -> dict[Path, bytes]:
         ("convert", ["-o", "out.xosc", "--allow", "nowhere"], "nowhere: no such folder to allow"),
         ("convert", ["-o", "out.xosc", "--profile", "none.json"], "none.json: no such file"),
         ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or directory"),
-        ("play", ["-o", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
-        ("play", ["-o", "out.xlsx"], "out.xlsx: can't write .xlsx: expected a name ending in .csv"),
-        ("play", ["-o", "theirs.csv"], "theirs.csv: exists and was not written by xosc-lateral"),
+        ("states", ["-o", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
+        ("states", ["-o", "out.xlsx"], "out.xlsx: can't write .xlsx: expected a name ending in .csv"),
+        ("states", ["-o", "theirs.csv"], "theirs.csv: exists and was not written by xosc-lateral"),
     ],
 )
 def test_no_verb_writes_over_its_inputs(
@@ -84,7 +84,7 @@ def test_no_verb_writes_over_measured_drives(
 
 
 @pytest.mark.parametrize("limit", ["nan", "-1", "inf"])
-@pytest.mark.parametrize("verb", ["segments", "play", "convert"])
+@pytest.mark.parametrize("verb", ["segments", "states", "convert"])
 def test_a_time_limit_that_is_none_is_wrong_usage(
     scenario: Path, verb: str, limit: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -125,7 +125,7 @@ def test_what_this_package_wrote_is_written_again_and_what_was_edited_is_not(
     scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(scenario.parent)
-    words = ["play", "cut-in.xosc", "--time-limit", "1", "-q", "-o"]
+    words = ["states", "cut-in.xosc", "--time-limit", "1", "-q", "-o"]
     for name in ("states.csv", "states.csv.gz", "states.parquet"):
         assert main([*words, name]) == main([*words, name]) == 0
     assert main(["template", "write", "cut-in", "-o", "."]) == 0

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+import xosc_lateral as xl
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, to_lane
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import app
+from xosc_lateral.workflows.batch import guard
 from xosc_lateral.workflows.batch.manifest import read_manifest
 
 RUN = CliRunner()
@@ -39,11 +42,11 @@ def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
     assert "time limit" in result.stderr
 
 
-@pytest.mark.parametrize("verb", ["play", "convert"])
+@pytest.mark.parametrize("verb", ["states", "convert"])
 def test_a_run_that_is_cut_off_warns_when_quiet_and_fails_when_strict(
     verb: str, scenario: Path, tmp_path: Path
 ) -> None:
-    output = tmp_path / ("s.csv" if verb == "play" else "out.xosc")
+    output = tmp_path / ("s.csv" if verb == "states" else "out.xosc")
     words = [verb, str(scenario), "-o", str(output), "-q"]
     cut = RUN.invoke(app, [*words, "--time-limit", "1"])
     assert cut.exit_code == 0 and "time limit of 1 s" in cut.stderr
@@ -78,9 +81,22 @@ def test_a_missing_vehicle_catalog_is_an_error_when_strict(scenario: Path, tmp_p
     assert usual.exit_code == 0
     assert "played as a car of usual size" in usual.stderr
     table.unlink()
-    for words in (["play", str(scenario), "-o", str(table)], ["convert", str(scenario), "-o", str(enriched)]):
+    for words in (["states", str(scenario), "-o", str(table)], ["convert", str(scenario), "-o", str(enriched)]):
         refused = RUN.invoke(app, [*words, "--strict"])
         assert isinstance(refused.exception, FormatError)
         assert "catalog 'Cars' not found" in str(refused.exception)
     assert not table.exists()
     assert not enriched.exists()
+
+
+@pytest.mark.parametrize("words", ["states {} -o {}.csv", "segments {}", "view {} --no-open"])
+def test_no_scenario_keeps_a_verb_busy_for_ever(words: str, scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def busy(path: Path, **options: object) -> None:
+        while path:
+            pass
+
+    monkeypatch.setattr(xl, "play", busy)
+    monkeypatch.setattr(guard, "JobLimits", partial(guard.JobLimits, timeout=0.1))
+    result = RUN.invoke(app, [word.format(scenario, scenario) for word in words.split()])
+    assert isinstance(result.exception, guard.JobLimitError)
+    assert str(result.exception) == f"{scenario}: took longer than 0.1 s"

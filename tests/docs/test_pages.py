@@ -63,6 +63,7 @@ NOT_RUN = {
     ("docs/how_to/esmini.md", "esmini --headless"): SIMULATOR,
     ("docs/how_to/from_a_recording.md", "xosc-lateral reconstruct tasi"): RECORDING,
     ("docs/how_to/from_a_recording.md", "xosc-lateral convert a39/"): RECORDING,
+    ("docs/how_to/from_a_recording.md", "xosc-lateral fit drives.csv"): RECORDING,
     ("docs/live.md", "once per step"): EXCERPT,
     ("docs/pipeline.md", "scenario,profile"): EXCERPT,
     ("docs/plugins.md", "[project.entry-points"): EXCERPT,

@@ -274,7 +274,7 @@ def test_a_full_disk_names_the_output(tmp_path, capsys, monkeypatch):
 
     write_template("cut-in", tmp_path)
     monkeypatch.setattr(Path, "replace", full)
-    line = refused(["play", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
+    line = refused(["states", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
     assert line == f"xosc-lateral: {tmp_path}/states.csv: no space left on device\n"
 
 
@@ -290,7 +290,7 @@ def test_what_no_scenario_says_is_refused(before, after, what, tmp_path, capsys)
     write_template("cut-in", tmp_path)
     for path in (tmp_path / "cut-in.xosc", *tmp_path.rglob("*.xodr")):
         path.write_text(path.read_text().replace(before, after))
-    assert what in refused(["play", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
+    assert what in refused(["states", tmp_path / "cut-in.xosc", "-o", tmp_path / "states.csv"], capsys)
 
 
 def test_a_header_cell_is_no_formula():

@@ -61,7 +61,7 @@ VERBS = {
     "export": "export c -o {out} --force -p motorway | motorway-vehicle-3",
     "convert": "convert {given}/cut-in.xosc -o {out}/o.xosc --report {out}/r.html --time-limit 3 --seed 1 | 2",
     "reproduce": "reproduce -o {out}/o.xosc {given}/first.xosc | {given}/second.xosc",
-    "play": "play {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
+    "states": "states {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
     "view": "view {given}/cut-in.xosc -o {out}/o.html --image {out}/o.svg --no-open --time-limit 2 | 3",
     "fit": "fit {given}/drive.csv -o {out}/o.json --model two-level --source first | second",
     "evaluate": "evaluate {given}/drive.csv -p motorway --report {out}/o.html --seed 1 | 2",
@@ -69,7 +69,6 @@ VERBS = {
     "detect": "detect {given}/cut-in.xosc -o {out}/o.csv --report {out}/o.html --time-limit 12 --seed 1 | 2",
     "import": "import table -o {out}/o.csv {given}/drive.csv | {given}/other.csv",
     "reconstruct": "reconstruct {given}/tracks.csv --road {given}/road.xodr -o {out}/ --force --version 1.2 | 1.1",
-    "derive": "profiles derive -o {out}/o.json motorway --mean 0.1 | 0.2",
     "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway-vehicle-2 | motorway-vehicle-3",
     "add": "profiles add {given}/own.json --library {out} --force --tag day | night",
 }

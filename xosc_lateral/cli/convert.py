@@ -17,6 +17,7 @@ from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
+    from xosc_lateral.workflows.batch.guard import JobLimits
     from xosc_lateral.workflows.conversion.conversion import Conversion
 
 # What is said of one option stays together.
@@ -62,13 +63,14 @@ def convert(
     reply: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
+    from xosc_lateral.workflows.batch.guard import JobLimits
     from xosc_lateral.workflows.batch.request import is_single
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
     report = batch.get("report")
     if len(scenario) == 1 and is_single(scenario[0]) and batch.get("shard") is None:
-        limits = {"timeout": batch["job_timeout"], "memory": batch["job_memory"]}
+        limits = JobLimits(batch["job_timeout"], batch["job_memory"])
         source, variants, labels = Path(scenario[0]), batch["variants"], batch["labels"]
         _convert_one(source, output, options, limits, variants, report, osi, summary, reply, labels=labels)
         return
@@ -98,13 +100,13 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path, output: str | None, options: dict[str, Any], limits: Mapping[str, float], variants: int,
+    source: Path, output: str | None, options: dict[str, Any], limits: JobLimits, variants: int,
     report: str | None, osi: str | None, summary: str | None, reply: Written, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, label_files, numbered, output_file
-    from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
+    from xosc_lateral.workflows.batch.guard import JobLimitError, within_limits
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
     from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside
@@ -112,7 +114,7 @@ def _convert_one(
 
     def limited(target: Path | None, **more: Any) -> Conversion:
         try:
-            return within_limits(lambda path: convert(source, path, **more, **options), target, JobLimits(**limits))
+            return within_limits(lambda path: convert(source, path, **more, **options), target, limits)
         except JobLimitError as error:
             raise JobLimitError(f"{source}: {error}") from error
 

@@ -18,7 +18,7 @@ app = group_of_verbs()
 
 @command(
     app, "check", VERBS["check"],
-    "check drives.csv.gz --report health.html", "check day.csv --write-mapping company.toml",
+    "check drives.csv.gz --report health.html", "check drives.csv.gz --write-mapping mapping.toml",
 )
 def check(
     tables: Tables, *,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -32,6 +33,15 @@ from xosc_lateral.files.source import changes
 # fmt: off
 app = group_of_verbs()
 
+
+
+def _played(scenario: Path, options: Mapping[str, Any]) -> xl.Playback:
+    """Within the limits of a batch's scenario: no file keeps a verb busy for ever."""
+    from xosc_lateral.workflows.batch.guard import for_one
+
+    return for_one(lambda path: xl.play(path, **options), scenario)
+
+
 Scenario = Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)]
 
 
@@ -55,7 +65,7 @@ def states(
 
     stem = scenario.stem
     table, trace = reply.claim([scenario], table=(output, f"{stem}.csv"), trace=(osi, f"{stem}_gt.mcap"))
-    played = xl.play(scenario, **options)
+    played = _played(scenario, options)
     with together():
         if table is not None:
             played.write(table, force=reply.force)
@@ -81,7 +91,7 @@ def segments(
     scenario: Scenario, *, options: Annotated[Options, xl.segments], reply: Printing,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
-    played = xl.play(scenario, **options)
+    played = _played(scenario, options)
     listed = xl.segments(played)
     warn(played.warnings)
     reply.say(listed)
@@ -113,7 +123,7 @@ def view(
     usual = None if image or animation else scenario.with_name(f"{scenario.stem}_view.html")
 
     def write(force: bool) -> tuple[xl.Playback, Path | None]:
-        played = xl.play(scenario, **options)
+        played = _played(scenario, options)
         page = output or usual
         with together():
             written = [None if page is None else played.write_page(page, force=force)]

@@ -95,8 +95,8 @@ def drives_of_table(
     try:
         return _drives_of(frame_of(table), as_mapping(mapping), Path(path), Counter() if lost is None else lost)
     except FormatError as error:
-        said = f"{error.element or ''} {error.what}"
-        if ("column" not in said and "--map" not in said) or not Path(path).suffix:
+        message = f"{error.element or ''} {error.what}"
+        if ("column" not in message and "--map" not in message) or not Path(path).suffix:
             raise
         what = f"{error.what}; all columns: xosc-lateral check {Path(path).name} --report PAGE.html"
         raise FormatError(what, path=error.path, line=error.line, element=error.element) from error

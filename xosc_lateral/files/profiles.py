@@ -19,7 +19,7 @@ from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import check_profile
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata
 from xosc_lateral.drivers.model.records import plain
-from xosc_lateral.files.atomic import at_once, write_atomically
+from xosc_lateral.files.atomic import at_once, mend, write_atomically
 from xosc_lateral.files.configuration import configured_libraries
 from xosc_lateral.files.json_text import canonical_json, parse_json
 from xosc_lateral.files.output_paths import file_name
@@ -131,7 +131,11 @@ def _read_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
 
 
 def write_profile(profile: DriverProfile, path: str | Path) -> None:
-    """Write a profile file, whole or not at all; the same profile gives the same bytes. Raises `OSError`."""
+    """Write a profile file, whole or not at all; the same profile gives the same bytes. Raises `OSError`.
+
+    What a killed run has left of it is removed.
+    """
+    mend([Path(path)])
     write_atomically(Path(path), profile_bytes(profile))
 
 

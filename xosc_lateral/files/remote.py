@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import atexit
+import posixpath
 import re
 import shutil
 import tempfile
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from functools import cache
 from glob import glob, has_magic
 from importlib import import_module
 from pathlib import Path
+from typing import IO
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import FILE_SIZE
@@ -38,8 +41,8 @@ def _files_of(path: str | Path, *, is_pattern: bool) -> list[Path]:
         return _copies(match[1], match[2], is_pattern)
     if not is_pattern or Path(path).exists():
         return [Path(path)]
-    if found := [Path(file) for file in sorted(glob(str(path), recursive=True))]:  # noqa: PTH207 (a whole path)
-        return found
+    if matches := [Path(file) for file in sorted(glob(str(path), recursive=True))]:  # noqa: PTH207 (a whole path)
+        return matches
     raise FormatError("no file is called so", path=path)
 
 
@@ -52,8 +55,8 @@ def _copies(scheme: str, rest: str, is_pattern: bool) -> list[Path]:
         raise FormatError(f"{scheme}:// needs fsspec: pip install fsspec", path=address) from error
     try:
         files, place = url_to_fs(address)
-        found, made = sorted(files.glob(place)) if is_pattern else [place], list[Path]()
-        for name in found:
+        names, made = sorted(files.glob(place)) if is_pattern else [place], list[Path]()
+        for name in names:
             if (size := sum(files.du(name, total=False).values())) > FILE_SIZE.bytes:
                 raise FormatError(FILE_SIZE.refusal(size / 1e6), path=address)
             made.append(_folder() / scheme / str(name).lstrip("/"))
@@ -74,3 +77,40 @@ def _folder() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="xosc-lateral-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
+
+
+# ---- single files, without a copy: as they are now
+_URL = re.compile(r"[a-z][a-z0-9+.-]+://")
+
+
+def is_url(stated: object) -> bool:
+    """Whether it is a place that fsspec knows: ``s3://bucket/cut-in.xosc``, ``memory://a``."""
+    return isinstance(stated, str) and _URL.match(stated) is not None
+
+
+def open_url(url: str, mode: str) -> AbstractContextManager[IO[bytes]]:
+    """Open a file in a bucket or the like. Raises `FormatError`: what that needs is not installed."""
+    try:
+        import fsspec
+
+        opened: AbstractContextManager[IO[bytes]] = fsspec.open(url, mode)
+    except (ImportError, ValueError) as error:
+        raise FormatError(
+            f"can't be opened: {error} (pip install fsspec, and its package for this place)", path=url
+        ) from error
+    return opened
+
+
+def fetched(url: str) -> bytes:
+    """Bytes of a file there, as it is now. Raises `FormatError`: see `open_url`; it is too large."""
+    with open_url(url, "rb") as file:
+        data = file.read(FILE_SIZE.bytes + 1)
+    if len(data) > FILE_SIZE.bytes:
+        raise FormatError(FILE_SIZE.refusal(len(data) / 1e6), path=url)
+    return data
+
+
+def urljoin(base: str, written: str) -> str:
+    """Where a reference leads to, as seen from the file at a URL."""
+    scheme, _, path = base.partition("://")
+    return f"{scheme}://{posixpath.normpath(posixpath.join(posixpath.dirname(path), written))}"

@@ -307,7 +307,13 @@ def read_context(path: Path) -> ContextTable:
 
     NaN values are left out row by row: between what is stated, values are interpolated.
     """
-    table = read_table(path)
+    context = context_of_table(read_table(path), path)
+    context.sha256 = parsed_hash(path)
+    return context
+
+
+def context_of_table(table: pd.DataFrame, path: Path) -> ContextTable:
+    """The same of a table that is read; `path`: what errors call it."""
     if "time" not in table:
         raise FormatError("no column 'time'", path=path)
     if table["time"].dtype.kind not in "fiu":
@@ -318,7 +324,6 @@ def read_context(path: Path) -> ContextTable:
     if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
     context = ContextTable()
-    context.sha256 = parsed_hash(path)
     for name in map(str, table.columns.drop("time")):
         values = _context_values(table[name], name, time, path)
         known = np.isfinite(values)

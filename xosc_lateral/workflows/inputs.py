@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import html
 import os
-import posixpath
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
-from typing import IO, Any, TypeAlias
+from typing import Any, TypeAlias
 from xml.etree import ElementTree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.limits import FILE_SIZE
 from xosc_lateral.files.held import Held, hold
+from xosc_lateral.files.remote import fetched, is_url, urljoin
 from xosc_lateral.files.source import read_source
 
 DocumentLike: TypeAlias = Any
@@ -24,7 +22,6 @@ RoadLike: TypeAlias = Any
 """The road; or roads and catalogs by their names as seen from the scenario."""
 
 _KINDS = "a path, bytes, XML text, a file-like object, an lxml tree or a scenariogeneration object"
-_URL = re.compile(r"[a-z][a-z0-9+.-]+://")
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _LOGIC_FILE = re.compile(rb"<LogicFile\s[^>]*?filepath\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _ENCODING = re.compile(r"\A(\s*<\?xml[^>]*?)\s+encoding\s*=\s*[\"'](?!utf-?8[\"'])[^\"']*[\"']", re.IGNORECASE)
@@ -56,7 +53,7 @@ def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: s
         name, data = (Path(stated).name if isinstance(stated, str) else "") or f"{name}.xosc", in_memory
     files, road_name = {name: data}, None
     if road is None and is_url(scenario) and (written := _road_in(data)):
-        files[written] = _fetched(urljoin(str(scenario), written))
+        files[written] = fetched(urljoin(str(scenario), written))
     if isinstance(road, Mapping):
         files |= {str(key): _bytes(value, f"road[{key!r}]") for key, value in road.items()}
     elif road is not None:
@@ -73,38 +70,6 @@ def several(stated: Any) -> list[Any]:
     return list(stated) if is_list and not ElementTree.iselement(stated) else [stated]
 
 
-def is_url(stated: object) -> bool:
-    """Whether it is a place that fsspec knows: ``s3://bucket/cut-in.xosc``, ``memory://a``."""
-    return isinstance(stated, str) and _URL.match(stated) is not None
-
-
-def open_url(url: str, mode: str) -> AbstractContextManager[IO[bytes]]:
-    """Open a file in a bucket or the like. Raises `FormatError`: what that needs is not installed."""
-    try:
-        import fsspec
-
-        opened: AbstractContextManager[IO[bytes]] = fsspec.open(url, mode)
-    except (ImportError, ValueError) as error:
-        raise FormatError(
-            f"can't be opened: {error} (pip install fsspec, and its package for this place)", path=url
-        ) from error
-    return opened
-
-
-def _fetched(url: str) -> bytes:
-    with open_url(url, "rb") as file:
-        data = file.read(FILE_SIZE.bytes + 1)
-    if len(data) > FILE_SIZE.bytes:
-        raise FormatError(FILE_SIZE.refusal(len(data) / 1e6), path=url)
-    return data
-
-
-def urljoin(base: str, written: str) -> str:
-    """Where a reference leads to, as seen from the file at a URL."""
-    scheme, _, path = base.partition("://")
-    return f"{scheme}://{posixpath.normpath(posixpath.join(posixpath.dirname(path), written))}"
-
-
 def _bytes(stated: Any, what: str) -> bytes:
     data = _document(stated, what)
     return read_source(stated).data if data is None else data
@@ -117,7 +82,7 @@ def _document(stated: Any, what: str) -> bytes | None:
     if isinstance(stated, str) and stated.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(stated)
     if is_url(stated):
-        return _fetched(stated)
+        return fetched(stated)
     if isinstance(stated, str | os.PathLike):
         return None
     if hasattr(stated, "read"):

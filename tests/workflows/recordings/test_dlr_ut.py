@@ -47,6 +47,12 @@ def _vehicle(number: int, begin: float, *, turns: bool) -> pd.DataFrame:
 
 @pytest.fixture(scope="module")
 def data_set(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pd.DataFrame]:
+    path = tmp_path_factory.mktemp("city") / "DLR-Urban-Traffic.zip"
+    return path, write_city(path)
+
+
+def write_city(path: Path) -> pd.DataFrame:
+    """A data set as it is published, and its rows with the truth."""
     made = [_vehicle(k, 20.0 * k + 3.0, turns=k % 2 == 1) for k in range(24)]
     walker = made[0].assign(id=99, kind="pedestrian", center_northing=5.79e6 + 30.0)
     rows = pd.concat([*made, walker], ignore_index=True)
@@ -62,7 +68,6 @@ def data_set(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pd.DataFra
     light = pd.concat(lights).assign(timestamp=lambda one: START + pd.to_timedelta(one["time"], unit="s"))
     every = START + pd.to_timedelta(np.arange(0.0, 560.0, 10.0), unit="s")
     weather = pd.DataFrame({"timestamp": every, "wind_speed": 3.0, "visibility": 2e4, "rain_intensity": np.nan})
-    path = tmp_path_factory.mktemp("city") / "DLR-Urban-Traffic.zip"
     with zipfile.ZipFile(path, "w") as archive:
         for kind, part in {
             "trajectories": table[list(COLUMNS)],
@@ -71,7 +76,7 @@ def data_set(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, pd.DataFra
             "road_condition": pd.DataFrame({"timestamp": every, "surface_grip": 0.8}),
         }.items():
             archive.writestr(f"x/raw_data/{kind}/{kind}_1.csv", part.to_csv(index=False))
-    return path, rows
+    return rows
 
 
 def test_tracks_lie_in_the_lanes_of_their_traffic_and_know_their_light(data_set: tuple[Path, pd.DataFrame]) -> None:

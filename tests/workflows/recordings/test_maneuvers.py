@@ -178,4 +178,23 @@ def test_drivers_move_before_a_lane_change_whose_begin_they_know(
     # a vehicle under test decides when it begins: nobody knows that before
     assert (moved(own, ego=["Ego"]) == moved(without, ego=["Ego"])).all()
     # nor does anybody move who does not move in his lane
-    assert not moved(own, enrich=["Ego"], ego=["none"]).abs().max() > 1e-9
+    assert not moved(own, only=["Ego"], ego=["none"]).abs().max() > 1e-9
+
+
+def test_in_reactive_outputs_they_do_where_the_begin_is_known(profile: Path, tmp_path: Path) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path)
+    own = xl.read_profile(profile)
+    (change,) = (one for one in xl.play(scenario)._played.motion.actions if "CutInEvent" in one.path)
+
+    def played(driver: xl.DriverProfile, name: str, ego: str) -> pd.Series:
+        settings = {"profile": driver, "seed": 3, "neighbours": "none", "mode": "lane-offset"}
+        made = xl.convert(scenario, tmp_path / f"{name}.xosc", ego=[ego], **settings)
+        rows = xl.play(tmp_path / f"{name}.xosc").to_frame()
+        assert made.modes["CutIn"] == "lane-offset"
+        return rows[rows["name"] == "CutIn"].set_index("time")["offset_t"]
+
+    without = replace(own, maneuvers=None)
+    difference = played(own, "own", "none") - played(without, "without", "none")
+    assert difference[difference.index < change.start].max() > 0.6 * DRIFT
+    assert difference[difference.index > change.start + 6.0].abs().max() < 0.02
+    assert (played(own, "reacts", "Ego") == played(without, "still", "Ego")).all()  # it begins by a distance to Ego

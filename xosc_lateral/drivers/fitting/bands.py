@@ -46,7 +46,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     rounded,
     simulate,
 )
-from xosc_lateral.drivers.fitting.models.bursts import as_bursting
+from xosc_lateral.drivers.fitting.models.bursts import as_bursting, has_bursts
 from xosc_lateral.drivers.fitting.sensor.likelihood import KNOTS, interpolation
 from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
@@ -326,8 +326,8 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     volatility = model.fine_volatility if fast is None or corner > BORDER else fast.volatility
     fine = shaped(np.sqrt(kept_power / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
-    if fast is not None:
-        made = as_bursting(made, lambda one: simulate(one, SEEN_ROWS, SEED, drivers=SEEN_DRIVERS), model)
+    if fast is not None and has_bursts(model):
+        made = as_bursting(made, lambda varied: simulate(varied, SEEN_ROWS, SEED, drivers=SEEN_DRIVERS), model)
     kept = [
         effect
         for effect in profile.effects

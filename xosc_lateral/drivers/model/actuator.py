@@ -26,11 +26,11 @@ from xosc_lateral.drivers.model.plausibility import ACCELERATION_LIMIT, GRAVITY,
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import Movement, combine, offsets_of
 
-RESPONSE_SPEED, RESPONSE_ACCELERATION = 0.2, 0.1
+RESPONSE_SPEED, RESPONSE_ACCELERATION = 0.2, 0.06
 """Of a response to context that was not known beforehand. [m/s], [m/s2]
 
-Drivers who keep their lane, half a metre aside within four to five seconds: with their own movement, at most 0.6 m/s2
-of motorway profiles, it stays below 1 m/s2 (`laboratory.surprises`).
+Drivers who keep their lane, half a metre aside within six seconds: with their own movement, at most 0.8 m/s2 of
+motorway profiles at 33 m/s, it stays below 1 m/s2 (`laboratory.surprises`).
 """
 
 LARGEST_SPEED, LARGEST_ACCELERATION = ACCELERATION_LIMIT**2 / JERK_LIMIT, ACCELERATION_LIMIT

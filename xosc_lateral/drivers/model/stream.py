@@ -23,6 +23,7 @@ from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD, extrapolate
 from xosc_lateral.drivers.model.plausibility import TRIAL_SPEED, TRIAL_STEPS, check_context, check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.drivers.model.seeds import child
 
 FORMAT = "xosc-lateral offset stream"
 
@@ -81,6 +82,8 @@ class OffsetStream:
         Offset at time 0; without it the drive starts as chance has it. [m]
     time : float
         Of the first offset in the drive's clock, for effects that depend on time. [s]
+    drive : int, optional
+        Number, from 0, of the drive that `sample` gives for that seed, and `start` of a compiled driver.
 
     Raises `ValueError` if the rate is no whole multiple of the model's.
 
@@ -100,8 +103,10 @@ class OffsetStream:
         rate: float | None = None,
         start: float | None = None,
         time: float = 0.0,
+        drive: int | None = None,
     ) -> None:
         sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        sequence = sequence if drive is None else child(sequence, drive)
         factor = _steps_per_model_step(rate, profile.model.step)
         seeded = SeedState(sequence.entropy, tuple(sequence.spawn_key))
         self._begin_with(profile, sequence, StreamState(seed=seeded, factor=factor, start=start, time=time))

@@ -61,14 +61,14 @@ _NEWER = {
 
 def remark_newer(root: XmlElement) -> list[Unsupported]:
     """One remark for each kind of what version 1.4 has and nobody plays, at its first place."""
-    found: dict[str, etree._Element] = {}
+    elements: dict[str, etree._Element] = {}
     for item in root.xml.iter("{*}*"):
         name = "layer" if item.get("layer") == "temporary" else local_name(item)
         parent = item.getparent()
         is_timed = name == "Motion" and parent is not None and parent.get("time") is not None
         if name in _NEWER and not is_timed:
-            found.setdefault(name, item)
-    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in found.items())
+            elements.setdefault(name, item)
+    places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in elements.items())
     return [Unsupported(place.element, place, f"{name} {_NEWER[name]}") for name, place in places]
 
 

@@ -16,6 +16,7 @@ from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.names import in_terminal
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.files.remote import is_url
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState, remove_empty, whole_folder
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
 from xosc_lateral.workflows.batch.guard import JobLimits
@@ -26,7 +27,6 @@ from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.inputs import is_url
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 

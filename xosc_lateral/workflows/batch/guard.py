@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 from xosc_lateral.base.errors import XoscLateralError
@@ -44,11 +45,17 @@ class JobLimits:
 
     timeout: float = JOB_TIMEOUT.value
     memory: float = JOB_MEMORY.value
+    fixed: bool = False  # The verb has no options that raise them.
 
     @property
     def too_much(self) -> str:
         """Why a job was ended that took more memory."""
-        return f"took more than {self.memory:g} MB of memory; --job-memory raises the limit"
+        return f"took more than {self.memory:g} MB of memory" + "; --job-memory raises the limit" * (not self.fixed)
+
+    @property
+    def too_long(self) -> str:
+        """Why a job was ended that took more time."""
+        return f"took longer than {self.timeout:g} s" + "; --job-timeout raises the limit" * (not self.fixed)
 
 
 def let_worker_die() -> None:
@@ -67,6 +74,14 @@ def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits)
         raise JobLimitError(limits.too_much) from error
     except _Interrupted as error:
         raise JobLimitError(watch.why) from error
+
+
+def for_one(work: Callable[[Path], Result], path: Path) -> Result:
+    """``work(path)`` within the limits of one scenario of a batch. Raises `JobLimitError`, which names the file."""
+    try:
+        return within_limits(work, path, JobLimits(fixed=True))
+    except JobLimitError as error:
+        raise JobLimitError(f"{path}: {error}") from error
 
 
 class _Watch:
@@ -107,7 +122,7 @@ class _Watch:
 
     def _exceeded(self) -> str:
         if time.monotonic() - self._begin > self._limits.timeout:
-            return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
+            return self._limits.too_long
         if status_bytes(1) - self._resident > 1e6 * self._limits.memory:
             return self._limits.too_much
         return ""

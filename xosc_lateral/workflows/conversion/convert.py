@@ -20,6 +20,7 @@ from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.held import exists, held_at
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
+from xosc_lateral.files.remote import is_url, open_url
 from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
@@ -32,7 +33,7 @@ from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertS
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.user_player import told_by_player
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
-from xosc_lateral.workflows.inputs import DocumentLike, is_url, open_url, scenario_input
+from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.nominal import NominalMotion

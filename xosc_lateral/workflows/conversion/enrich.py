@@ -270,11 +270,11 @@ def _anticipated(
     """
     time = drawn.motion.time
     offset, free = np.zeros(len(knots)), float(time[spans[0].first])
-    for one in drawn.crossings:
-        begin, end = float(time[one.first]), float(time[one.last])
-        if spans[0].first <= one.first and one.last <= spans[-1].last and end > begin:
-            if one.is_lane_change:
-                left = side * float(one.way[-1]) > 0.0
+    for crossing in drawn.crossings:
+        begin, end = float(time[crossing.first]), float(time[crossing.last])
+        if spans[0].first <= crossing.first and crossing.last <= spans[-1].last and end > begin:
+            if crossing.is_lane_change:
+                left = side * float(crossing.way[-1]) > 0.0
                 offset += side * maneuvers.anticipation(time[knots], begin, end, left=left, free=free)
             free = end
     return offset

@@ -91,8 +91,8 @@ def quality_result(made: ConvertedScenario) -> bytes:
         "stays_in_lane": [f"{one.name} by {one.beyond:.2f} m at {one.time:.1f} s" for one in movement.departures],
         "all_is_played": list(movement.motion.notes),
     }
-    said = {*movement.warnings(), *map(str, movement.motion.doubts)}
-    problems["no_other_warning"] = [line for line in made.warnings if line not in said]
+    reported_apart = {*movement.warnings(), *map(str, movement.motion.doubts)}
+    problems["no_other_warning"] = [line for line in made.warnings if line not in reported_apart]
     root = etree.Element("CheckerResults", version="1.0.0")
     bundle = etree.SubElement(
         root, "CheckerBundle", build_date="", name="xosc-lateral", version=__version__,
@@ -102,13 +102,13 @@ def quality_result(made: ConvertedScenario) -> bytes:
     number = 0
     for rule, asks in RULES.items():
         uid = f"xosc.lateral:xosc:{made.provenance.version}:{rule}"
-        found = problems[rule]
+        rule_problems = problems[rule]
         checker = etree.SubElement(
             bundle, "Checker", status="completed", checkerId=f"xosc_lateral_{rule}", description=asks,
-            summary=f"{len(found)} issue(s)",
+            summary=f"{len(rule_problems)} issue(s)",
         )  # fmt: skip
         etree.SubElement(checker, "AddressedRule", ruleUID=uid)
-        for problem in found:
+        for problem in rule_problems:
             text = problem.what if isinstance(problem, Note) else problem
             level = {"no_new_contact": "1", "all_is_played": "3"}.get(rule, "2")
             issue = etree.SubElement(checker, "Issue", issueId=str(number), description=text, level=level, ruleUID=uid)

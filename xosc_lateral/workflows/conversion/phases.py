@@ -29,10 +29,16 @@ from xosc_lateral.world.motion.offset_path import (
     pieces_along,
     spacing_of,
 )
+from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
 from xosc_lateral.world.motion.way import LANE_ENDS, Break, way_of
 from xosc_lateral.world.scenario.controllers import Domains
-from xosc_lateral.world.scenario.private_actions import LATERAL, AcquirePositionAction, AssignRouteAction
+from xosc_lateral.world.scenario.private_actions import (
+    LATERAL,
+    AcquirePositionAction,
+    AssignRouteAction,
+    LaneChangeAction,
+)
 
 LEAST_LENGTH = 20.0
 """A shorter path is none: it would hardly leave where it begins. [m]"""
@@ -76,7 +82,26 @@ class _Phases:
         self._offset = deviation_through(
             [_sampled(one, motion, self._driven, is_last=one is entity.segments[-1]) for one in entity.segments]
         )
+        self._foreseeing = self._foreseen()
         self._spacing = self._spacing_of(motion)
+
+    def _foreseen(self) -> Offset:
+        """The offset, with what a driver does before lane changes that no vehicle under test decides to begin."""
+        profile, motion = self._entity.profile, self._entity.motion
+        maneuvers = None if profile is None else profile.maneuvers
+        if profile is None or maneuvers is None:
+            return self._offset
+        moved, free = np.zeros(len(motion.time)), float(motion.time[0])
+        for played in sorted(self._own, key=lambda action: action.start):
+            if played.path not in self._lateral or played.end is None or not played.end > played.start:
+                continue
+            if isinstance(played.action.content, LaneChangeAction) and played.path not in self._plan.depends.begins:
+                road = self._network.roads[int(motion.road[self._entity.segments[0].span.first])]
+                mirror = -1.0 if (road.rule == "LHT") != profile.left_hand else 1.0
+                left = leads_left(motion, self._network, played.start, played.end) == (mirror > 0.0)
+                moved += mirror * maneuvers.anticipation(motion.time, played.start, played.end, left=left, free=free)
+            free = played.end
+        return lambda distance: np.asarray(self._offset(distance) + np.interp(distance, self._driven, moved))
 
     def from_the_start(self, adding: Path | None) -> OffsetPath | None:
         """It is put down where its offsets begin, unless it is added later, or begins with a lateral action.
@@ -134,7 +159,7 @@ class _Phases:
         foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
         cut = min(foreseen, default=np.inf) if is_known else np.inf
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
-        offset: Offset = self._offset
+        offset: Offset = self._foreseeing if is_known else self._offset
         if start is not None:
             offset = approached(offset, begin, start, APPROACH_TIME * self._speed_at(begin))
         pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))

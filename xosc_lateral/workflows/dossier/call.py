@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -12,14 +11,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.json_text import canonical_json
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
-from xosc_lateral.workflows.dossier.claims import Claim, Contents, Finding, State, contents_of, judged, summary_of
+from xosc_lateral.workflows.dossier.claims import (
+    Claim,
+    Contents,
+    Finding,
+    State,
+    contents_of,
+    judged,
+    known_anomalies,
+    summary_of,
+)
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, DrivesLike, Result, given_profile
 
@@ -138,24 +145,17 @@ def _profile_parts(profile: DriverProfile) -> dict[str, list[tuple[str, str]]]:
     }
 
 
-def known_anomalies() -> list[str]:
-    """Limitations as the documentation has them, without its links."""
-    text = (shipped_folder("docs") / "limitations.md").read_text(encoding="utf-8")
-    points = [" ".join(point.split()) for point in text.split("\n- ")[1:]]
-    return [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", point).replace("**", "") for point in points]
-
-
 def _versions() -> dict[str, str]:
     package = Path(__file__).resolve().parents[2]
     sources = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         sources.update(path.relative_to(package).as_posix().encode() + path.read_bytes())
-    found = {distribution: metadata.version(distribution) for distribution in ENVIRONMENT}
+    packages = {distribution: metadata.version(distribution) for distribution in ENVIRONMENT}
     return {
         "xosc-lateral": f"{__version__}, behaviour {BEHAVIOUR}",
         "sha256 of its modules": sources.hexdigest(),
         "Python": f"{platform.python_version()} on {platform.system()} {platform.machine()}",
-        **found,
+        **packages,
     }
 
 
@@ -209,7 +209,7 @@ class Dossier(Result):
         """HTML."""
         from xosc_lateral.workflows.dossier.page import dossier_page
 
-        return dossier_page(self, self._contents)
+        return dossier_page(f"{self.kind} {self.subject}", self._contents, self.findings, self.parts, self.versions)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page, and beside it the same as JSON."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Container, Iterable, Mapping
 from enum import StrEnum
 from importlib.resources import files
@@ -11,6 +12,7 @@ from typing import Any, Literal
 import msgspec
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.files.source import read_toml
 
 
@@ -85,10 +87,10 @@ def contents_of(path: Path | None) -> Contents:
     contents = _read(shipped)
     if path is None:
         return contents
-    own = _read(path)
-    claims = {claim.id: claim for claim in (*contents.claim, *own.claim)}
-    return Contents(own.purpose or contents.purpose, contents.clauses | own.clauses, [*claims.values()],
-                    [*contents.tool, *own.tool])  # fmt: skip
+    users = _read(path)
+    claims = {claim.id: claim for claim in (*contents.claim, *users.claim)}
+    return Contents(users.purpose or contents.purpose, contents.clauses | users.clauses, [*claims.values()],
+                    [*contents.tool, *users.tool])  # fmt: skip
 
 
 def _read(path: Path) -> Contents:
@@ -96,6 +98,13 @@ def _read(path: Path) -> Contents:
         return msgspec.convert(read_toml(path, "not a file of claims"), Contents)
     except msgspec.ValidationError as error:
         raise FormatError(f"not a file of claims: {error}", path=path) from error
+
+
+def known_anomalies() -> list[str]:
+    """Limitations as the documentation has them, without its links."""
+    text = (shipped_folder("docs") / "limitations.md").read_text(encoding="utf-8")
+    points = [" ".join(point.split()) for point in text.split("\n- ")[1:]]
+    return [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", point).replace("**", "") for point in points]
 
 
 def judged(

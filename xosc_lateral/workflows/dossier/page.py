@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone, inline
-from xosc_lateral.workflows.dossier.claims import Contents, Finding, State
-
-if TYPE_CHECKING:
-    from xosc_lateral.workflows.dossier.call import Dossier
+from xosc_lateral.workflows.dossier.claims import Contents, Finding, State, known_anomalies
 
 TITLES = {
     "validity": "Validity by frequency, speed, lane width, road",
@@ -20,17 +17,22 @@ TITLES = {
 _COLOURS = {State.HOLDS: "#1a7f37", State.BROKEN: "#c62828", State.STATED: "#8a6d00", State.UNTESTED: "#8a6d00"}
 
 
-def dossier_page(dossier: Dossier, contents: Contents) -> str:
-    """HTML; the same dossier, the same bytes."""
-    from xosc_lateral.workflows.dossier.call import known_anomalies
-
-    page = Page(f"Dossier: {dossier.kind} {dossier.subject}")
+def dossier_page(
+    subject: str,
+    contents: Contents,
+    findings: Sequence[Finding],
+    parts: Mapping[str, Sequence[tuple[str, str]]],
+    versions: Mapping[str, str],
+) -> str:
+    """HTML; equal values, equal bytes. `parts`: what is known besides the claims, by part."""
+    page = Page(f"Dossier: {subject}")
     page.lead(contents.purpose)
-    counts = {state: sum(finding.state is state for finding in dossier.findings) for state in State}
+    counts = {state: sum(finding.state is state for finding in findings) for state in State}
     tones: dict[State, Tone] = {State.BROKEN: "bad"} if counts[State.BROKEN] else {State.HOLDS: "good"}
     page.key_figures(KeyFigure(count, str(state), tone=tones.get(state, "")) for state, count in counts.items())
-    for finding in dossier.broken:
-        page.warning(f"Broken claim: {finding.claim.words}")
+    for finding in findings:
+        if finding.state is State.BROKEN:
+            page.warning(f"Broken claim: {finding.claim.words}")
 
     def begin(part: str, title: str) -> None:
         page.section(title, f"Answers: {'; '.join(contents.clauses.get(part, ['no clause']))}.")
@@ -38,10 +40,10 @@ def dossier_page(dossier: Dossier, contents: Contents) -> str:
     begin("purpose", "Purpose and scope")
     page.text(contents.purpose)
     begin("claims", "Claims, and what shows them")
-    page.table([_claim_row(finding) for finding in dossier.findings])
+    page.table([_claim_row(finding) for finding in findings])
     for part, title in TITLES.items():
         begin(part, title)
-        page.table([{"": name, "what is known": words} for name, words in dossier.parts[part]])
+        page.table([{"": name, "what is known": words} for name, words in parts[part]])
     begin("anomalies", "Known anomalies")
     page.items(known_anomalies())
     begin("tool", "Tool classification, as proposed")
@@ -51,8 +53,8 @@ def dossier_page(dossier: Dossier, contents: Contents) -> str:
     )
     page.table(contents.tool)
     begin("versions", "Versions and hashes")
-    page.table([{"": name, "version": words} for name, words in dossier.versions.items()])
-    return page.html({"subject": dossier.subject, "versions": dict(dossier.versions)})
+    page.table([{"": name, "version": words} for name, words in versions.items()])
+    return page.html({"subject": subject, "versions": dict(versions)})
 
 
 def _claim_row(finding: Finding) -> dict[str, object]:

@@ -17,6 +17,8 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
+from xosc_lateral.world.motion.segments import leads_left
+from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
@@ -98,44 +100,46 @@ def _drawn(
 ) -> dict[str, list[float]]:
     """Parameter -> a duration for each variation [s]; the draft's lane changes refer to these parameters."""
     from xosc_lateral.files.openscenario.references import parameter_name
-    from xosc_lateral.files.openscenario.write.draft import source_of
-    from xosc_lateral.world.scenario.private_actions import LaneChangeAction
 
-    drawn, declarations = dict[str, list[float]](), _declarations(draft.root)
-    own = {parameter_name(item.get("name") or "") for item in declarations}
-    actions = sorted(played.motion.actions, key=lambda one: (one.start, one.path))
-    for action in actions:
-        is_own = action.action.place.path == str(played.scenario.path)  # a catalog's is shared
-        change = action.action.content
-        if not isinstance(change, LaneChangeAction) or action.actor is None or not is_own:
-            continue
-        element = source_of(action.action, played.scenario, draft.root)
-        dynamics = element.find(".//{*}LaneChangeActionDynamics")
-        if dynamics is None or dynamics.get("dynamicsDimension") != "time" or dynamics.get("dynamicsShape") == "step":
-            continue
+    changes = _lane_changes(draft, played)
+    declarations = draft.root.find("{*}ParameterDeclarations")
+    if declarations is None:
+        declarations = etree.Element("ParameterDeclarations")
+        draft.root.insert(1, declarations)
+    drawn, declared = dict[str, list[float]](), {parameter_name(item.get("name") or "") for item in declarations}
+    for action, dynamics in changes:
         written = dynamics.get("value") or ""
         name = parameter_name(written) if written.startswith("$") else ""
         if name in drawn:
             continue
-        if name not in own:
-            name = _free_name(f"{action.actor}_{action.path[-1]}_duration", own)
-            value = f"{change.dynamics.value:g}"
+        if name not in declared:
+            name = _free_name(f"{action.actor}_{action.path[-1]}_duration", declared)
+            value = f"{action.action.content.dynamics.value:g}"
             etree.SubElement(declarations, "ParameterDeclaration", name=name, parameterType="double", value=value)
             dynamics.set("value", f"${name}")
-            own.add(name)
+            declared.add(name)
         weights = _weights(action, played, maneuvers)
         rows = rng.choice(len(weights), size=count, p=weights)
         drawn[name] = np.round(maneuvers.column("duration")[rows], 3).tolist()
     return drawn
 
 
-def _declarations(root: etree._Element) -> etree._Element:
-    """The element that holds the scenario's parameters; made where there is none."""
-    found = root.find("{*}ParameterDeclarations")
-    if found is None:
-        found = etree.Element("ParameterDeclarations")
-        root.insert(1, found)
-    return found
+def _lane_changes(draft: Draft, played: Played) -> list[tuple[PlayedAction, etree._Element]]:
+    """The scenario's own that last for a time, in order of their begin, with the elements that say how long."""
+    from xosc_lateral.files.openscenario.write.draft import source_of
+    from xosc_lateral.world.scenario.private_actions import LaneChangeAction
+
+    changes = []
+    for action in sorted(played.motion.actions, key=lambda action: (action.start, action.path)):
+        is_shared = action.action.place.path != str(played.scenario.path)  # it is a catalog's
+        if is_shared or action.actor is None or not isinstance(action.action.content, LaneChangeAction):
+            continue
+        written = action.action.content.dynamics
+        dynamics = source_of(action.action, played.scenario, draft.root).find(".//{*}LaneChangeActionDynamics")
+        is_timed = written.dimension is DynamicsDimension.TIME and written.shape is not DynamicsShape.STEP
+        if dynamics is not None and is_timed:
+            changes.append((action, dynamics))
+    return changes
 
 
 def _free_name(wanted: str, taken: set[str]) -> str:
@@ -147,13 +151,11 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 def _weights(action: PlayedAction, played: Played, maneuvers: Maneuvers) -> FloatArray:
     """Of the profile's rows, by what the scenario's vehicle does when it begins to change lanes."""
     vehicle = next(one for one in played.motion.entities if one.name == action.actor)
-    end = vehicle.time[-1] if action.end is None else action.end
-    first, last = (min(int(np.searchsorted(vehicle.time, t)), len(vehicle.time) - 1) for t in (action.start, end))
-    road, lane = int(vehicle.road[first]), int(vehicle.lane[first])
-    aside = (int(vehicle.lane[last]) - lane) * played.network.travel_direction(road, lane)
-    width = float(played.network.lane_width(road, lane, vehicle.s[first]))
-    left = aside * int(vehicle.way(np.array([first]))[0]) > 0
-    return maneuvers.weights(left=left, speed=float(vehicle.speed[first]), lane_width=width)
+    row = min(int(np.searchsorted(vehicle.time, action.start)), len(vehicle.time) - 1)
+    end = float(vehicle.time[-1]) if action.end is None else action.end
+    width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
+    left = leads_left(vehicle, played.network, action.start, end)
+    return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width)
 
 
 def _distribution(
@@ -170,9 +172,9 @@ def _distribution(
     sub(owner, "ScenarioFile", filepath=scenario)
     holder = sub(owner, "Deterministic/DeterministicMultiParameterDistribution/ValueSetDistribution")
     for values in zip(*drawn.values(), strict=True):
-        one = sub(holder, "ParameterValueSet")
+        variation = sub(holder, "ParameterValueSet")
         for name, value in zip(drawn, values, strict=True):
-            sub(one, "ParameterAssignment", parameterRef=name, value=decimal(value, 3))
+            sub(variation, "ParameterAssignment", parameterRef=name, value=decimal(value, 3))
     etree.indent(root, "  ")
     return root
 

@@ -45,11 +45,11 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     """
     from xosc_lateral.workflows.recordings.importers.foreign_table import propose_mapping, recognised
 
-    files, told = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
-    found, left = recognised([read_table(path, told) for path in files], files[-1])
-    proposal = propose_mapping(files, told)
+    files, stated = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
+    seen, left = recognised([read_table(path, stated) for path in files], files[-1])
+    proposal = propose_mapping(files, stated)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))
-    mappings = [told, replace(guess, columns={**guess.columns, **told.columns}, roles=told.roles)]
+    mappings = [stated, replace(guess, columns={**guess.columns, **stated.columns}, roles=stated.roles)]
     wrong, read = list[str](), None
     for mapping in mappings if mappings[0] != mappings[1] else mappings[:1]:
         try:
@@ -60,12 +60,12 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
             wrong += [what] if what not in wrong else []
     rows = [
         {
-            "column": one.name, "in the table": one.header, "unit": told.columns[one.name].unit or "as it is"
-            if one.name in told.columns else one.unit or "as it is",
-            "seen": "by the mapping" if one.name in told.columns else one.why, **_range(one.numbers),
+            "column": one.name, "in the table": one.header, "unit": stated.columns[one.name].unit or "as it is"
+            if one.name in stated.columns else one.unit or "as it is",
+            "seen": "by the mapping" if one.name in stated.columns else one.why, **_range(one.numbers),
             "empty [%]": round(100.0 * float(one.values.isna().mean()), 1),
         }
-        for one in found
+        for one in seen
     ]  # fmt: skip
     profile, why = (None, "") if read is None else _fitted(read)
     return Health(files, tuple(rows), tuple(left), read, bool(wrong) and read is not None, tuple(wrong),

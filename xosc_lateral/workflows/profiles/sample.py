@@ -14,8 +14,9 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
+from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.files.tables import read_context, read_table
+from xosc_lateral.files.tables import context_of_table, frame_of, read_table
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -24,7 +25,7 @@ from xosc_lateral.workflows.result import (
     Paths,
     ProfileLike,
     Result,
-    as_paths,
+    frame_hash,
     given_drives,
     given_profile,
     naming,
@@ -96,23 +97,34 @@ def _context_alone(
     """Drives in the middle of a lane under tables that hold context over time and no place in a lane, as `convert
     --context` takes them; None: they hold such places.
     """
-    if as_mapping(columns) != TableMapping() or not isinstance(context, str | Path | list | tuple):
+    if as_mapping(columns) != TableMapping():
         return None
-    files = as_paths(context) if isinstance(context, str | Path) else tuple(context)
-    if not all(isinstance(file, str | Path) for file in files):
-        return None
-    drives = []
-    for path in map(Path, files):
-        names = {plain_header(str(name)) for name in read_table(path).columns}
-        if any(name.startswith(("offset", "distance_left", "distance_right")) for name in names) or "drive" in names:
+    drives, inputs = list[Drive](), dict[str, str]()
+    stated = context if isinstance(context, list | tuple) else [context]
+    items: list[Any] = [
+        each for item in stated for each in (inputs_of([item]) if isinstance(item, str | Path) else [item])
+    ]
+    for number, item in enumerate(items, start=1):
+        if isinstance(item, Drive):
             return None
-        known = read_context(path)
+        is_file = isinstance(item, Path)
+        name = str(item) if is_file else "DataFrame" if len(items) == 1 else f"DataFrame {number}"
+        table = read_table(Path(name)) if is_file else frame_of(item)
+        headers = {plain_header(str(header)) for header in table.columns}
+        places = ("offset", "distance_left", "distance_right")
+        if any(header.startswith(places) for header in headers) or "drive" in headers:
+            return None
+        if not is_file:
+            inputs[name] = frame_hash(table)
+        known = context_of_table(table, Path(name))
         first, last = (pick(at[edge] for at, _ in known.values()) for pick, edge in ((min, 0), (max, -1)))
         time = np.arange(first, last + 1e-9, STEP)
-        values = {name: np.interp(time, *over_time) for name, over_time in known.items()}
+        values = {column: np.interp(time, *over_time) for column, over_time in known.items()}
         width = values.setdefault("lane_width", np.full(len(time), lane_width or profile.lane_width))
-        drives.append(Drive(file_label(path), time, np.zeros(len(time)), width, values, source=str(path)))
-    return GivenDrives(drives, parsed_hashes(map(Path, files)), tuple(map(Path, files)))
+        label = file_label(Path(name)) if is_file else name
+        drives.append(Drive(label, time, np.zeros(len(time)), width, values, source=name))
+    files = tuple(item for item in items if isinstance(item, Path))
+    return GivenDrives(drives, parsed_hashes(files) | inputs, files)
 
 
 LEFT_OUT_NOTE = "not known, left without effect"

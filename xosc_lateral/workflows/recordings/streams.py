@@ -13,8 +13,8 @@ from xosc_lateral.workflows.recordings.importers.tracks import Strip
 
 SPACING = 1.0  # of points on a path [m]
 DRIVING = 0.5  # who is slower stands, and only seems to go on a way [m/s]
-SHORTEST = 20.0  # of a path, or a lane where streams part: less says nothing about who drives where [m]
-NEAR = 1.5  # farther from a path's line is another lane's: half a narrow one [m]
+LEAST_LENGTH = 20.0  # of a path, or a lane where streams part: less says nothing about who drives where [m]
+LANE_DISTANCE = 1.5  # farther from a path's line is another lane's: half a narrow one [m]
 ALONG = np.cos(np.radians(20.0))  # who goes another way by more is of another stream [-]
 WITHIN = 0.9  # of a path's points that have to lie so along a stream [-]
 LEAST_OTHERS = 6  # so many vehicles make a lane [-]
@@ -32,7 +32,7 @@ class _Stream:
 
         away, k = cKDTree(self.points).query(path)
         agreement = (_tangents(path) * _tangents(self.points)[k]).sum(axis=1)
-        return np.asarray(away), np.asarray((away < NEAR) & (agreement > ALONG))
+        return np.asarray(away), np.asarray((away < LANE_DISTANCE) & (agreement > ALONG))
 
 
 def _tangents(points: FloatArray) -> FloatArray:
@@ -48,21 +48,23 @@ def streams(x: FloatArray, y: FloatArray, speed: FloatArray, vehicle: IntArray) 
         if len(moving) > 1:
             way = np.r_[0.0, np.cumsum(np.hypot(np.diff(x[moving]), np.diff(y[moving])))]
             at = np.arange(0.0, way[-1], SPACING)
-            if len(at) * SPACING >= SHORTEST:
+            if len(at) * SPACING >= LEAST_LENGTH:
                 paths.append(np.stack([np.interp(at, way, x[moving]), np.interp(at, way, y[moving])], axis=1))
-    found = list[_Stream]()
+    bundles = list[_Stream]()
     for path in sorted(paths, key=len, reverse=True):
         best, nearest = None, np.inf
-        for stream in found:
+        for stream in bundles:
             away, along = stream.beside(path)
             if along.mean() >= WITHIN and away[along].mean() < nearest:
                 best, nearest = stream, float(away[along].mean())
         if best is None:
             best = _Stream(path)
-            found.append(best)
+            bundles.append(best)
         best.paths.append(path)
-    busy = sorted((one for one in found if len(one.paths) >= LEAST_OTHERS), key=lambda one: -len(one.paths))
-    return [line for one in busy if len(line := _mean_path(one)) * SPACING >= SHORTEST]
+    busy = sorted(
+        (stream for stream in bundles if len(stream.paths) >= LEAST_OTHERS), key=lambda stream: -len(stream.paths)
+    )
+    return [line for stream in busy if len(line := _mean_path(stream)) * SPACING >= LEAST_LENGTH]
 
 
 def _mean_path(stream: _Stream) -> FloatArray:
@@ -71,11 +73,11 @@ def _mean_path(stream: _Stream) -> FloatArray:
 
     points = stream.points
     for _ in range(ROUNDS):
-        strip = strip_about(points, 2.0 * NEAR)
+        strip = strip_about(points, 2.0 * LANE_DISTANCE)
         count, total = np.zeros(len(points)), np.zeros(len(points))
         for path in stream.paths:
             way, aside, *_ = strip.place(*path.T)
-            near = np.isfinite(way) & (np.abs(aside) < NEAR)
+            near = np.isfinite(way) & (np.abs(aside) < LANE_DISTANCE)
             at = np.clip(np.round(way[near] / strip.length * (len(points) - 1)).astype(np.int64), 0, len(points) - 1)
             at, first = np.unique(at, return_index=True)
             count[at] += 1.0
@@ -100,7 +102,7 @@ def strip_about(points: FloatArray, width: float) -> Strip:
 
 def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[list[int]]]:
     """Lanes, shape (n, 2) each, and those that each leads to; streams that go along one another are one lane there."""
-    own = list[FloatArray]()  # of each stream what no earlier one has
+    parts = list[FloatArray]()  # of each stream what no earlier one has
     cuts: list[set[int]] = []
     links = list[tuple[tuple[int, int], tuple[int, int]]]()  # from a lane's point to another's
     from scipy.spatial import cKDTree
@@ -108,7 +110,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
     for line in lines:
         owner, place = np.full(len(line), -1), np.zeros(len(line), dtype=np.int64)
         nearest = np.full(len(line), np.inf)
-        for number, other in enumerate(own):
+        for number, other in enumerate(parts):
             away, along = _Stream(other).beside(line)
             better = along & (away < nearest)
             owner[better], nearest[better] = number, away[better]
@@ -116,9 +118,9 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
         before: tuple[int, int] | None = None
         for number, part in _runs(owner):
             if number < 0:
-                own.append(line[part])
+                parts.append(line[part])
                 cuts.append({0, part.stop - part.start - 1})
-                begin, end = (len(own) - 1, 0), (len(own) - 1, part.stop - part.start - 1)
+                begin, end = (len(parts) - 1, 0), (len(parts) - 1, part.stop - part.start - 1)
             else:
                 begin, end = (number, int(place[part.start])), (number, int(place[part.stop - 1]))
             if before is not None and before[0] != begin[0]:
@@ -128,7 +130,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
             before = end
     lanes, following = list[FloatArray](), list[list[int]]()
     ends, starts = dict[tuple[int, int], int](), dict[tuple[int, int], int]()
-    for number, line in enumerate(own):
+    for number, line in enumerate(parts):
         ordered = _apart(sorted(cuts[number]), len(line) - 1)
         for first, last in pairwise(ordered):
             starts[number, first] = ends[number, last] = len(lanes)
@@ -149,17 +151,17 @@ def _apart(places: list[int], last: int) -> list[int]:
     """Cuts of a line that are far enough from each other and from its ends."""
     kept = [0]
     for place in places:
-        if place - kept[-1] >= 0.5 * SHORTEST and last - place >= 0.5 * SHORTEST:
+        if place - kept[-1] >= 0.5 * LEAST_LENGTH and last - place >= 0.5 * LEAST_LENGTH:
             kept.append(place)
     return [*kept, last]
 
 
 def _runs(owner: IntArray) -> list[tuple[int, slice]]:
-    """Stretches of one owner (-1: none), those under `SHORTEST` taken as part of what is before them."""
+    """Stretches of one owner (-1: none), those under `LEAST_LENGTH` taken as part of what is before them."""
     edges = np.r_[0, np.flatnonzero(np.diff(owner)) + 1, len(owner)]
     runs = list[tuple[int, slice]]()
     for first, last in pairwise(edges.tolist()):
-        if last - first < SHORTEST / SPACING and (runs or last < len(owner)):
+        if last - first < LEAST_LENGTH / SPACING and (runs or last < len(owner)):
             if runs:
                 runs[-1] = runs[-1][0], slice(runs[-1][1].start, last)
             continue

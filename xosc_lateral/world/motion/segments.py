@@ -199,6 +199,16 @@ def crossings(motion: NominalMotion, entity: EntityMotion, runs: Sequence[Sequen
                 yield Crossing(first, last, way, stays, is_lane_change)
 
 
+def leads_left(entity: EntityMotion, network: RoadNetwork, begin: float, end: float) -> bool:
+    """Whether the lane that an entity is in at a time lies left of the one that it was in at an earlier one. [s]"""
+    first, last = (min(int(np.searchsorted(entity.time, t)), len(entity.time) - 1) for t in (begin, end))
+    aside = int(entity.lane[last]) - int(entity.lane[first])
+    way = int(entity.way(np.array([first]))[0]) * network.travel_direction(
+        int(entity.road[first]), int(entity.lane[first])
+    )
+    return aside * way > 0
+
+
 def beside_written(entity: EntityMotion, crossing: Crossing) -> tuple[slice, FloatArray]:
     """Rows on which the bell is beside the written way, and by how much, positive left. [m]"""
     begin, duration = _bell_time(entity, crossing)

@@ -51,6 +51,11 @@ def with_bursts(
     return _bursting(fast, shown + lack * (1.0 - (error / lack) ** 2), draw, _level(draw(model)))
 
 
+def has_bursts(model: AutoregressiveModel) -> bool:
+    """Whether drives showed any beyond chance."""
+    return model.coarse_volatility.correlation_time == BURST_TIME
+
+
 def as_bursting(model: AutoregressiveModel, draw: Draw, other: AutoregressiveModel) -> AutoregressiveModel:
     """A model in which movement of another origin hides no burst: lateral speeds have the kurtosis of another's."""
     return _bursting(model, log_kurtosis(draw(other)), draw, _level(draw(model)))

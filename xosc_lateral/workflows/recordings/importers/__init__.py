@@ -94,7 +94,7 @@ def import_drives(
     if not sources:
         raise ValueError("no source to import")
     read = find_importer(format)
-    made = read(sources[0] if len(sources) == 1 else sources, **_told(read, format, options))
+    made = read(sources[0] if len(sources) == 1 else sources, **_known_options(read, format, options))
     return as_imported(made, format, sources, options)
 
 
@@ -102,21 +102,21 @@ NUMBERS = {"float": float, "int": int, float: float, int: int}
 """Annotation of an option -> what makes a number of a text."""
 
 
-def _told(read: Callable[..., object], format: str, options: Mapping[str, Any]) -> dict[str, Any]:  # noqa: A002
+def _known_options(read: Callable[..., object], format: str, options: Mapping[str, Any]) -> dict[str, Any]:  # noqa: A002
     """Options that a reader has; texts of the command line become numbers where it says so. Raises `FormatError`."""
     _, *known = inspect.signature(read).parameters.values()
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
         return dict(options)
-    kinds, told = {parameter.name: parameter.annotation for parameter in known}, {}
+    kinds, known_values = {parameter.name: parameter.annotation for parameter in known}, {}
     kinds |= {"keep_cut": bool} if getattr(read, "can_keep_cut", False) else {}
     for name, value in options.items():
         if name not in kinds:
             raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
         try:
-            told[name] = NUMBERS.get(kinds[name], str)(value) if isinstance(value, str) else value
+            known_values[name] = NUMBERS.get(kinds[name], str)(value) if isinstance(value, str) else value
         except ValueError as error:
             raise FormatError(f"importer {format!r}: {name} {value!r} is not a number") from error
-    return told
+    return known_values
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -172,7 +172,7 @@ def lights_of_lanes(
     them drove off."""
     same = np.r_[tracks.vehicle[1:] == tracks.vehicle[:-1], False]
     off = np.flatnonzero(same & (tracks.speed < ROLLING) & (np.r_[tracks.speed[1:], 0.0] >= ROLLING) & (lane >= 0))
-    found = dict[int, tuple[int, float]]()
+    lights_of = dict[int, tuple[int, float]]()
     for number in np.unique(lane[off]).tolist():
         mine = off[lane[off] == number]
         stop = float(np.quantile(along[mine], FIRST))
@@ -185,5 +185,5 @@ def lights_of_lanes(
         }
         best = max(turned, key=lambda name: turned[name], default=-1)
         if best >= 0 and turned[best] >= SURE_SHARE:
-            found[number] = best, stop
-    return found
+            lights_of[number] = best, stop
+    return lights_of

@@ -142,40 +142,40 @@ def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recogni
         if name is not None:
             headers[name] = header
     values = {header: pd.concat([table[header] for table in tables], ignore_index=True) for header in headers.values()}
-    found = [Recognised(name, header, *_unit_of(name, header, values[header]), values[header])
+    columns = [Recognised(name, header, *_unit_of(name, header, values[header]), values[header])
              for name, header in headers.items()]  # fmt: skip
-    return found, [header for header in shared if header not in values]
+    return columns, [header for header in shared if header not in values]
 
 
 def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) -> str:
     """TOML of a mapping of these tables, with what each line was guessed from; `mapping`: what is known."""
     known = mapping or TableMapping()
-    found, left = recognised([read_table(path, known) for path in files], files[-1])
-    headers = {one.name for one in found}
+    columns, left = recognised([read_table(path, known) for path in files], files[-1])
+    headers = {one.name for one in columns}
     needed = ("time",) if SIDES.keys() <= headers else ("time", "offset", "lane_width")
     lines = [
         f"# Proposed from {', '.join(path.name for path in files)}: read every line, correct it, save it, and give it",
         '# with --mapping FILE. NAME = "COLUMN" or "COLUMN:UNIT"; a unit with a minus turns the sign.',
-        *_text_lines(files, known, found),
+        *_text_lines(files, known, columns),
         "",
         "[columns]",
-        *map(_line, found),
+        *map(_line, columns),
         *(
             f'# {name} = "?"  # needed, and not found; {no_time(left, "") if name == "time" else ""}'.rstrip("; ")
             for name in needed
             if name not in headers
         ),
     ]
-    for one in found:
-        if one.name != "drive" and not len(one.numbers):
-            lines += _texts(one.name, one.values)
+    for column in columns:
+        if column.name != "drive" and not len(column.numbers):
+            lines += _texts(column.name, column.values)
     if left:
         lines += ["", f"# Others keep their names: {', '.join(left[:40])}"]
     lines += ["", "# [roles]  # where a column comes from, for close-loop", '# curvature = "road"', ""]
     return "\n".join(lines)
 
 
-def _text_lines(files: Sequence[Path], known: TableMapping, found: Sequence[Recognised]) -> list[str]:
+def _text_lines(files: Sequence[Path], known: TableMapping, columns: Sequence[Recognised]) -> list[str]:
     """How the tables are written, where that is not plain, and what stands for no value."""
     seen = [seen for path in files if (seen := text_layout(path, known)) is not None]
     codes, layouts = {code for code, _ in seen}, {layout[2:] for _, layout in seen}
@@ -183,7 +183,7 @@ def _text_lines(files: Sequence[Path], known: TableMapping, found: Sequence[Reco
     if len(layouts) == 1 and (layout := seen[0][1]) and (layout.header > 1 or layout.units):
         lines += [f"separator = {_quoted(layout.separator or ',')}", f"header = {layout.header}  # line"]
         lines += [f"units = {layout.unit_row}  # line"] if layout.units else []
-    markers = {one.header: marker for one in found if (marker := usual_marker(one.numbers, one.header)) is not None}
+    markers = {one.header: marker for one in columns if (marker := usual_marker(one.numbers, one.header)) is not None}
     if markers:
         why = "; ".join(f"{value:g} in {rows} of {header}" for header, (value, rows) in markers.items())
         numbers = ", ".join(f"{value:g}" for value in sorted({value for value, _ in markers.values()}))
@@ -226,13 +226,13 @@ def _unit_of(name: str, header: str, column: pd.Series) -> tuple[str, str]:
     return unit, "unit by the size of its values" if unit else "by its header"
 
 
-def _line(one: Recognised) -> str:
-    numbers = one.numbers
+def _line(column: Recognised) -> str:
+    numbers = column.numbers
     seen = f"; {numbers.min():.4g} to {numbers.max():.4g}" if len(numbers) else ""
-    sign = f"; CHECK: {SIGNS[one.name]}" if one.name in SIGNS else ""
-    source = f"{one.header}:{one.unit}" if one.unit else one.header
-    entry = f"{{column = {_quoted(one.header)}}}" if ":" in one.header and not one.unit else _quoted(source)
-    return f"{one.name} = {entry}  # {one.why}{seen}{sign}"
+    sign = f"; CHECK: {SIGNS[column.name]}" if column.name in SIGNS else ""
+    source = f"{column.header}:{column.unit}" if column.unit else column.header
+    entry = f"{{column = {_quoted(column.header)}}}" if ":" in column.header and not column.unit else _quoted(source)
+    return f"{column.name} = {entry}  # {column.why}{seen}{sign}"
 
 
 def _numbers(column: pd.Series) -> FloatArray:

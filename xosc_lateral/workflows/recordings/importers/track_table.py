@@ -162,14 +162,14 @@ def tracks_of(
     steps = np.diff(time[order])[(np.diff(codes[order]) == 0) & (np.diff(time[order]) > 0.0)]
     if len(steps):  # in a wrong unit, all that moves leaps
         require_row_step(float(np.median(steps)), path)
-    given: dict[str, Any] = {name: rows[name].to_numpy(dtype=np.float64) for name in STATED if name in rows}
+    more: dict[str, Any] = {name: rows[name].to_numpy(dtype=np.float64) for name in STATED if name in rows}
     kinds = rows["vehicle_class"].to_numpy(dtype=str) if "vehicle_class" in rows else np.full(len(rows), "")
     usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
-    length = np.where(np.isfinite(stated := given.pop("length", usual)), stated, usual)
-    if "rear" in given:
-        given["rear"] = np.nan_to_num(given["rear"])
+    length = np.where(np.isfinite(stated := more.pop("length", usual)), stated, usual)
+    if "rear" in more:
+        more["rear"] = np.nan_to_num(more["rear"])
     tracks, _ = tracks_of_rows(
-        list(map(str, labels)), codes, time, x, y, path, length=length, kind=kinds, dropped=lost, **given,
+        list(map(str, labels)), codes, time, x, y, path, length=length, kind=kinds, dropped=lost, **more,
         recording=list(rows["recording"]) if "recording" in rows else None, is_believed=is_played or is_log,
     )  # fmt: skip
     require_row_step(tracks.step, path)
