@@ -158,6 +158,11 @@ class Term(ABC):
         return bool(later.columns) and not self.columns
 
     @classmethod
+    def asks_as(cls, other: Term) -> bool:
+        """Whether it asks what another term answers: of a column, whether it acts on the mean, or on the size."""
+        return cls.component == other.component or (bool(other.columns) and cls.kind == other.kind)
+
+    @classmethod
     def passes(cls, search: Search, p_value: float, fitted: Fitted) -> bool:
         """Whether the best that was found of its component is good enough to be added to the terms fitted."""
         if p_value <= search.levels[cls.component]:

@@ -159,7 +159,10 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             accepted += [Accepted(term, min([p_value, *(candidate.p_value for candidate in former)])) for term in new]
             seen_at = {}
             fitted = test.after or fit_model(search.coarse, (*fitted.terms, *new))
-    selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
+    # a column that was found is not among what was not, over time or in slow movement, say
+    known = {(alike.component, one.term.columns) for one in accepted for alike in TERMS if alike.asks_as(one.term)}
+    failing = tuple(rest for rest in rejected.values() if (rest.component, rest.columns) not in known)
+    selection = Selection(tuple(accepted), failing, start, fitted)
     for candidate in accepted:
         try:
             selection = _tested_again(search, selection, candidate)
@@ -221,7 +224,7 @@ def _tested_again(search: Search, selection: Selection, candidate: Accepted) -> 
     later = [other.term for other in selection.accepted[selection.accepted.index(candidate) + 1 :]]
     if not any(candidate.term.may_be_explained_by(term, search.coarse) for term in later):
         return selection
-    without = selection.without([candidate.term], "what was found after it explains it")
+    without = selection.without([candidate.term], "it does not stand beside what was found after it")
     search.progress(f"looking at {candidate.term.component.replace('_', ' ')} again")
     p_value = candidate.term.probability_beside(search, without.final)
     return selection if candidate.term.passes(search, p_value, without.final) else without

@@ -25,15 +25,16 @@ from xosc_lateral.drivers.loop.terms.between import (
     can_be_told,
     whole_drive_columns,
 )
-from xosc_lateral.drivers.loop.terms.column import DRIVING_QUANTILES
+from xosc_lateral.drivers.loop.terms.column import DRIVING_QUANTILES, of_kind
 from xosc_lateral.drivers.loop.terms.mean import MeanTerm
-from xosc_lateral.drivers.loop.terms.time import mean_alike, spread_alike
+from xosc_lateral.drivers.loop.terms.time import StepTerm, mean_alike, spread_alike
 
 # By how much the stated size and bound exceed the formula's: of 192 effects planted in 6 sets, 75 % are found at 1.2
 # times the size, and 98 % are found or below 1.15 times the bound. [-]
 SIZE_MARGIN, BOUND_MARGIN = 1.2, 1.15
 # Round sizes that minutes are stated for: a tenth of a metre, and a factor of a half more. [m], log
 AIMS = {"mean": 0.1, "spread": float(np.log(1.5))}
+IN_PROFILE = "in the profile"  # Of what was found, or the base has: it is not looked for any more.
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,7 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
     left = beside(known, problem.observed)
     noise, compact = unit * float(left.std()), problem.whitener.compact
     seconds = np.flatnonzero(problem.whitener.valid)
-    named = {name for term in fitted.terms if term.component == kind.component for name in term.columns}
+    named = {name for term in of_kind(fitted, kind) for name in term.columns}
     entries: dict[str, list[tuple[float, float, float]]] = {}
     for index, candidate in enumerate(search.quantities.candidates):
         if candidate.family is not Family.PLAIN:
@@ -107,7 +108,7 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
         smallest = SIZE_MARGIN * float(np.median(errors * (np.sqrt(np.maximum(critical + costs, 0.0)) + POWER_Z)))
         bound = BOUND_MARGIN * float(np.max(np.abs(sizes) + BOUND_Z * errors))
         if name in named:
-            yield Shown(name, acts, True, "found")
+            yield Shown(name, acts, True, IN_PROFILE)
         else:
             yield _entry(fitted, name, acts, "not found", smallest, bound)
 
@@ -130,7 +131,7 @@ def _of_whole_drives(search: Search, fitted: Fitted) -> Iterator[Shown]:
                 why += ": one drive alone differs" if there >= FEWEST_BETWEEN else f"; {FEWEST_BETWEEN} are needed"
                 yield Shown(what, kind.group, False, why)
             elif any(isinstance(term, kind) and name in term.columns for term in fitted.terms):
-                yield Shown(what, kind.group, True, "found")
+                yield Shown(what, kind.group, True, IN_PROFILE)
             else:
                 level = search.levels[kind.component] / number
                 yield _pooled(fitted, what, kind.group, between_drives(fitted, kind, values), level, np.ptp(values))
@@ -150,21 +151,28 @@ def _of_time(search: Search, fitted: Fitted) -> Iterator[Shown]:
     for acts, component, alike in looks:
         pooled = alike(fitted)
         if component in there:
-            yield Shown("time", acts, True, "found")
+            yield Shown("time", acts, True, IN_PROFILE)
         elif pooled is not None:
             yield _pooled(fitted, "time", acts, pooled, search.levels[component], float(seconds.max()))
         elif coarse.lasts:
             yield Shown("time", acts, True, "not found; its power is not known for fewer than three drives")
         else:
-            why = f"fewer than {FEWEST} drives of two minutes, and none of ten"
-            yield Shown("time", acts, False, why)
-    single = coarse.drives == 1 and coarse.lasts
-    why = "not found" if single else "several drives have no common step" if coarse.drives > 1 else "under ten minutes"
-    yield Shown("step", "mean", single, why)
-    outcome = "found" if "cycle" in there else "not found; 0.12 m is found on 9 of 10 sets of short drives"
-    yield Shown("cycle", "mean", bool((seconds > 0.0).any()), outcome)
-    why = "found" if "regimes" in there else "not found" if coarse.lasts else "needs a drive of ten minutes"
-    yield Shown("regimes", "spread", coarse.lasts, why)
+            yield Shown("time", acts, False, f"fewer than {FEWEST} drives of two minutes, and none of ten")
+    single, known = coarse.drives == 1 and coarse.lasts, "not found; 0.12 m is found on 9 of 10 sets of short drives"
     products = any(one.family is Family.PRODUCT for one in search.quantities.candidates)
-    why = "tested; no size is stated" if products else "there are no two columns"
-    yield Shown("products of two columns", "mean and spread", products, why)
+    none = "several drives have no common step" if coarse.drives > 1 else "under ten minutes"
+    hidden = (
+        ("step", "mean", single, StepTerm in map(type, fitted.terms), "not found", none),
+        ("cycle", "mean", bool(seconds.any()), "cycle" in there, known, "needs a drive of two minutes"),
+        ("regimes", "spread", coarse.lasts, "regimes" in there, "not found", "needs a drive of ten minutes"),
+        (
+            "products of two columns",
+            "mean and spread",
+            products,
+            False,
+            "no size is stated",
+            "there are no two columns",
+        ),
+    )
+    for what, acts, tested, kept, silent, untested in hidden:
+        yield Shown(what, acts, tested, IN_PROFILE if kept else silent if tested else untested)

@@ -239,7 +239,7 @@ def lack_of_fit_words(result: LoopResult) -> str:
     )
     return (
         f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
-        f"clearly above that between halves ({_mm(result.floor)}), and no effect was found that explains the rest."
+        f"clearly above that between halves ({_mm(result.floor)}), and no effect in the profile explains the rest."
         + (f" It stands out in: {where}." if where else "")
         + ("" if result.remainder is None or result.remainder.silent else f" {_remainder_words(result)}")
     )

@@ -74,7 +74,7 @@ class BetweenTerm(_DrivesTerm):
         if np.count_nonzero(places.weight) < MANY_DRIVES:
             return _best_of_whole_drives(cls, search, fitted)
         present = {name for term in of_kind(fitted, cls) for name in term.columns}
-        candidates, usual = [], []
+        candidates, usual, root = [], [], np.sqrt(places.weight)
         for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
             if (
                 len(candidate.columns) > 1
@@ -86,7 +86,7 @@ class BetweenTerm(_DrivesTerm):
                 or missing_throughout(coarse.context[candidate.columns[0]], coarse.timeline).any()
             ):
                 continue
-            mean = places.left(coarse.by_drive(values.astype(np.float64)))
+            mean = left_of_drives(coarse.by_drive(values.astype(np.float64)), places.known, root)
             power = float(mean @ mean)
             if power > 1e-12 and power**2 / max(float(np.sum(mean**4)), 1e-300) >= MIN_SUPPORT:
                 candidates.append(candidate)
@@ -94,7 +94,7 @@ class BetweenTerm(_DrivesTerm):
         if not candidates:
             return None
         members, p_value = best_of_drives(
-            places.left(places.place),
+            left_of_drives(places.place, places.known, root),
             places.weight > 0.0,
             np.stack(usual, axis=1),
             np.array([candidate.cost for candidate in candidates]),
@@ -218,10 +218,6 @@ class _Places:
         usual = [coarse.by_drive(part) for response in responses for part in response.T]
         known = np.column_stack([np.ones(groups), *usual])
         return cls(fitted.levels, weights_between(fitted.levels, noise, known), known)
-
-    def left(self, values: FloatArray) -> FloatArray:
-        """Times the weight's root, free of what is known; shape (drives,)."""
-        return left_of_drives(values, self.known, np.sqrt(self.weight))
 
     def sizes(self) -> tuple[FloatArray, FloatArray]:
         """Sizes of the known effects and their standard errors, shape (k,) each. [m] per unit"""
