@@ -43,12 +43,13 @@ def with_bursts(
     could be chance (James and Stein's estimate); where all of it could be, the model stays as it is.
     """
     measured, error = _measured(runs, drives)
-    shown = log_kurtosis(draw(model))
+    paths = draw(model)
+    shown = log_kurtosis(paths)
     lack = measured - shown
     if not lack > error:
         return model
     fast = replace(model, coarse_volatility=replace(model.coarse_volatility, correlation_time=BURST_TIME))
-    return _bursting(fast, shown + lack * (1.0 - (error / lack) ** 2), draw, _level(draw(model)))
+    return _bursting(fast, shown + lack * (1.0 - (error / lack) ** 2), draw, _level(paths))
 
 
 def has_bursts(model: AutoregressiveModel) -> bool:
@@ -70,9 +71,12 @@ def _bursting(model: AutoregressiveModel, wanted: float, draw: Draw, level: floa
     def varying(variance: float) -> AutoregressiveModel:
         return replace(model, coarse_volatility=replace(model.coarse_volatility, within=variance))
 
-    tried = model.coarse_volatility.within + MORE_VARIANCE
-    shown = np.maximum.accumulate([log_kurtosis(draw(varying(variance))) for variance in tried.tolist()])
-    made = varying(float(np.interp(wanted, shown, tried)))
+    tried, shown = (model.coarse_volatility.within + MORE_VARIANCE).tolist(), list[float]()
+    for variance in tried:
+        shown.append(max([log_kurtosis(draw(varying(variance))), *shown]))
+        if shown[-1] > wanted:  # what comes has more still
+            break
+    made = varying(float(np.interp(wanted, shown, tried[: len(shown)])))
     scale = made.coarse.scale * float(np.exp(level - _level(draw(made))))
     return replace(made, coarse=replace(made.coarse, scale=scale))
 
