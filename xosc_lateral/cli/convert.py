@@ -106,17 +106,14 @@ def _convert_one(
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, label_files, numbered, output_file
-    from xosc_lateral.workflows.batch.guard import JobLimitError, within_limits
+    from xosc_lateral.workflows.batch.guard import for_one
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
     from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside
     from xosc_lateral.workflows.result import PAGE_SUFFIXES
 
     def limited(target: Path | None, **more: Any) -> Conversion:
-        try:
-            return within_limits(lambda path: convert(source, path, **more, **options), target, limits)
-        except JobLimitError as error:
-            raise JobLimitError(f"{source}: {error}") from error
+        return for_one(lambda path: convert(path, target, **more, **options), source, limits)
 
     if output == STDOUT:
         if variants > 1 or reply.as_json or osi is not None or summary is not None or labels:

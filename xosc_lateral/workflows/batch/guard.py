@@ -76,10 +76,10 @@ def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits)
         raise JobLimitError(watch.why) from error
 
 
-def for_one(work: Callable[[Path], Result], path: Path) -> Result:
-    """``work(path)`` within the limits of one scenario of a batch. Raises `JobLimitError`, which names the file."""
+def for_one(work: Callable[[Path], Result], path: Path, limits: JobLimits | None = None) -> Result:
+    """``work(path)`` within limits, else those of a batch's scenario. Raises `JobLimitError`, which names the file."""
     try:
-        return within_limits(work, path, JobLimits(fixed=True))
+        return within_limits(work, path, limits or JobLimits(fixed=True))
     except JobLimitError as error:
         raise JobLimitError(f"{path}: {error}") from error
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.load import Played
     from xosc_lateral.world.motion.nominal import PlayedAction
 
-DATE = "2024-01-01T00:00:00"  # the format asks for one: the same inputs and seed give the same bytes
-
 
 @declare_options
 def vary(
@@ -162,11 +160,11 @@ def _distribution(
     version: tuple[int, int], scenario: str, drawn: dict[str, list[float]], description: str
 ) -> etree._Element:
     """The document that gives the parameters their values, a set for each variation."""
-    from xosc_lateral.files.openscenario.write.build import decimal, sub
+    from xosc_lateral.files.openscenario.write.build import HEADER_DATE, decimal, sub
 
     root = etree.Element("OpenSCENARIO")
     minor = max(version[1], 1)  # 1.0 has no parameter distributions
-    sub(root, "FileHeader", revMajor="1", revMinor=str(minor), date=DATE, description=description,
+    sub(root, "FileHeader", revMajor="1", revMinor=str(minor), date=HEADER_DATE, description=description,
         author=f"xosc-lateral {__version__}")  # fmt: skip
     owner = sub(root, "ParameterValueDistribution")
     sub(owner, "ScenarioFile", filepath=scenario)

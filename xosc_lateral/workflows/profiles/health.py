@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings, simplefilter
@@ -43,11 +44,11 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     FormatError
         Only where there is no table at all: what is wrong with one is part of the result.
     """
-    from xosc_lateral.workflows.recordings.importers.foreign_table import propose_mapping, recognised
+    from xosc_lateral.workflows.recordings.importers.foreign_table import mapping_text, recognised
 
     files, stated = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
     seen, left = recognised([read_table(path, stated) for path in files], files[-1])
-    proposal = propose_mapping(files, stated)
+    proposal = mapping_text(files, stated, seen, left)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))
     mappings = [stated, replace(guess, columns={**guess.columns, **stated.columns}, roles=stated.roles)]
     wrong, read = list[str](), None
@@ -105,7 +106,7 @@ class Health(Result):
     profile: DriverProfile | None  # None: none can be fitted, see `why`
     why: str
 
-    @property
+    @cached_property
     def drives(self) -> list[dict[str, Any]]:
         """A row for each drive."""
         return [_facts(drive) for drive in (self.read.drives if self.read else [])]

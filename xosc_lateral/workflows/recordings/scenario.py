@@ -9,7 +9,7 @@ import numpy as np
 from lxml import etree
 
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.build import Version, decimal, sub
+from xosc_lateral.files.openscenario.write.build import HEADER_DATE, Version, decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 from xosc_lateral.workflows.recordings.encounters import RelativeTrigger, Triggers
 from xosc_lateral.workflows.recordings.lateral import Transition, peak_acceleration
@@ -20,7 +20,6 @@ from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.enums import Priority
 
-DATE = "2024-01-01T00:00:00"  # the format asks for a date: the same recording gives the same bytes
 MODELS = {name: name for name in ("car", "van", "truck", "bus", "trailer", "motorbike", "bicycle")}
 MODELS["motorcycle"] = "motorbike"
 """Recorded class -> vehicle category, the same in all versions; others are cars."""
@@ -68,7 +67,7 @@ def reconstructed_scenario(
     build.time_trigger(act, "StartTrigger", 0.0, version)
 
     root = etree.Element("OpenSCENARIO")
-    header = sub(root, "FileHeader", revMajor=str(version[0]), revMinor=str(version[1]), date=DATE)
+    header = sub(root, "FileHeader", revMajor=str(version[0]), revMinor=str(version[1]), date=HEADER_DATE)
     header.set("description", plain_text(description))
     header.set("author", "xosc-lateral")
     parameters = sub(root, "ParameterDeclarations")

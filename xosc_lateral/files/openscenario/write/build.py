@@ -24,6 +24,9 @@ Version = tuple[int, int]
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z [m], heading, pitch, roll [rad]."""
 
+HEADER_DATE = "2024-01-01T00:00:00"
+"""Of documents that are made anew: the format asks for one, and the same inputs give the same bytes."""
+
 
 def version_text(version: Version) -> str:
     """A version as people write it."""

@@ -150,7 +150,11 @@ def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recogni
 def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) -> str:
     """TOML of a mapping of these tables, with what each line was guessed from; `mapping`: what is known."""
     known = mapping or TableMapping()
-    columns, left = recognised([read_table(path, known) for path in files], files[-1])
+    return mapping_text(files, known, *recognised([read_table(path, known) for path in files], files[-1]))
+
+
+def mapping_text(files: Sequence[Path], known: TableMapping, columns: Sequence[Recognised], left: Sequence[str]) -> str:
+    """The same of columns that are `recognised`, and headers that keep their names."""
     headers = {one.name for one in columns}
     needed = ("time",) if SIDES.keys() <= headers else ("time", "offset", "lane_width")
     lines = [
