@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rates import rate
+from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW
 from xosc_lateral.drivers.model.seeds import of_name
 from xosc_lateral.workflows.detection.band import Band
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, Truth, truth_of
 
-RATE_WINDOW = 0.5
-"""Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
-speed: what is known of one second, as a tracker knows it. [s]"""
+# Lateral speed is the change of position over the last `RATE_WINDOW`, lateral acceleration that of the lateral speed:
+# what is known of one second, as a tracker knows it.
 WATCHED_DISTANCE = 150.0
 """Vehicles farther ahead are not watched: 5 s at 30 m/s, as in `recordings.encounters`. [m]"""
 CARRIAGEWAY_DISTANCE = 30.0
@@ -91,14 +92,8 @@ def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measu
     if sensor.noise > 0.0:
         position = position + sensor.noise * rng.standard_normal(len(track))
     lateral = position[taken]
-    speed = _change(lateral)
-    return Measured(taken, lateral - track.base[taken], speed, _change(speed))
-
-
-def _change(values: FloatArray) -> FloatArray:
-    """Change over the last `RATE_WINDOW`, a second; shape as the argument."""
-    rows = round(RATE_WINDOW / STEP)
-    return np.asarray((values - values[np.maximum(np.arange(len(values)) - rows, 0)]) / RATE_WINDOW)
+    speed = rate(lateral, STEP, RATE_WINDOW, past=True)
+    return Measured(taken, lateral - track.base[taken], speed, rate(speed, STEP, RATE_WINDOW, past=True))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.track import Column, lane_levels
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course
@@ -136,5 +137,5 @@ STILL_SPEED = 0.01
 
 def moves_in_lane(track: LaneTrack, truth: Truth) -> bool:
     """Whether a vehicle moves sideways while it keeps its lane."""
-    rate = np.abs(np.diff(track.offset, prepend=track.offset[:1])) / STEP
-    return bool((rate[truth.keeping] > STILL_SPEED).any())
+    speed = np.abs(rate(track.offset, STEP, past=True))
+    return bool((speed[truth.keeping] > STILL_SPEED).any())

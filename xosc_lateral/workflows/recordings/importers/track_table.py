@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
 from xosc_lateral.drivers.drives.identity import apart_in_time, identify
 from xosc_lateral.files.columns import (
@@ -118,24 +119,10 @@ MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the ne
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
-def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
-    """Speed from positions, shape (n,). [m/s]"""
-    return np.hypot(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (x, y)))
-
-
-def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
-    """Heading from positions, shape (n,). [rad]"""
-    return np.arctan2(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (y, x)))
-
-
-def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, window: float) -> FloatArray:
-    """Difference over a window about each row, within a vehicle's rows."""
-    first = np.searchsorted(vehicle, vehicle, side="left")
-    last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    half = max(1, round(0.5 * window / step))
-    rows = np.arange(len(values))
-    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
-    return np.asarray((values[high] - values[low]) / np.where(high > low, time[high] - time[low], step))
+def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Heading [rad] and speed [m/s] from positions, shape (n,)."""
+    vx, vy = (rate(each, time, SPEED_WINDOW, whose=vehicle) for each in (x, y))
+    return np.arctan2(vy, vx), np.hypot(vx, vy)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
@@ -199,7 +186,7 @@ def tracks_of_rows(
     if not (same := whose[1:] == whose[:-1]).any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same])) if step is None else step
-    way, driven = travel_heading(x, y, whose, time, step), ground_speed(x, y, whose, time, step)
+    way, driven = travelled(x, y, whose, time)
     heading, speed = (
         otherwise if values is None else np.where(np.isfinite(values[order]), values[order], otherwise)
         for values, otherwise in ((heading, way), (speed, driven))
