@@ -157,21 +157,22 @@ class RoadLanes:
         return LaneGraph(self._end - self._start, np.where(same, left, -1), following)
 
     def stations(
-        self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray
-    ) -> tuple[IntArray, FloatArray, IntArray]:
-        """Part of the network, -1: in no driving lane, station there [m] and rank of places, as in `LaneGraph`."""
+        self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray, way: IntArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Places, shape (n,): line, of lanes that hang together and vehicles that drive there the same way, -1: in no
+        driving lane; lane of it, growing to the left of their travel; station, growing as they drive [m].
+        """
         piece, along = self.place(road, lane, s)
         part, station, rank, _ = self.graph.stations(np.maximum(piece, 0), along)
-        return np.where(piece >= 0, part, -1), station, rank
+        return np.where(piece >= 0, 2 * part + (way < 0), -1), way * rank, way * station
 
     def nearest(self, vehicles: Sequence[At], number: int, lane: int | None = None) -> list[tuple[int, float] | None]:
         """Who is next ahead of one of the vehicles, and behind, of those that drive the same way, in its lane or
         another of its road: number and free space [m]; None: nobody."""
         every = [*vehicles, vehicles[number]._replace(lane=vehicles[number].lane if lane is None else lane)]
         road, lanes, way, s, ahead, length = map(np.array, zip(*every, strict=True))
-        part, station, rank = self.stations(road, lanes, s)
-        group = in_groups(np.where(part >= 0, 2 * part + (way < 0), -1), rank - rank.min())
-        middle = way * station + ahead
+        line, rank, station = self.stations(road, lanes, s, way)
+        group, middle = in_groups(line, rank - rank.min()), station + ahead
         others = np.delete(np.arange(len(vehicles)), number)
         order = Order(group[others], middle[others])
         found = list[tuple[int, float] | None]()
