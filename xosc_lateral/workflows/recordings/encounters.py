@@ -92,15 +92,15 @@ def _beside(
     number = next((k for k, (one, _) in enumerate(there) if one is plan), None)
     if number is None:
         return [None, None]
-    found, speed, now = list[Beside | None](), float(plan.speed.at(np.array([time]))[0]), np.array([time])
+    beside, speed, now = list[Beside | None](), float(plan.speed.at(np.array([time]))[0]), np.array([time])
     for known, ahead in zip(lanes.nearest([at for _, at in there], number, lane), (1.0, -1.0), strict=True):
         if known is None or known[1] > ENCOUNTER_DISTANCE:
-            found.append(None)
+            beside.append(None)
             continue
         other, gap = there[known[0]][0], known[1]
         closing = (speed - float(other.speed.at(now)[0])) * ahead
-        found.append(Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf))
-    return found
+        beside.append(Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf))
+    return beside
 
 
 Triggers = tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]

@@ -175,13 +175,13 @@ class RoadLanes:
         group, middle = in_groups(line, rank - rank.min()), station + ahead
         others = np.delete(np.arange(len(vehicles)), number)
         order = Order(group[others], middle[others])
-        found = list[tuple[int, float] | None]()
+        next_to = list[tuple[int, float] | None]()
         for is_ahead in (True, False):
             (row,) = order.next_to(group[-1:], middle[-1:], is_ahead=is_ahead).tolist()
             k = int(others[row])
             free = max(abs(float(middle[k] - middle[-1])) - 0.5 * float(length[k] + length[-1]), 0.0)
-            found.append(None if row < 0 else (k, free))
-        return found
+            next_to.append(None if row < 0 else (k, free))
+        return next_to
 
 
 MOST_LANES = 64  # beside one another [-]
@@ -288,19 +288,20 @@ def find_neighbours(
     group = in_groups(np.where(known, frame, -1), lane)
     order = Order(group, s)
 
-    def nearest(aside: int, there: BoolArray, *, ahead_only: bool = False) -> tuple[FloatArray, FloatArray]:
+    def nearest(aside: int, there: BoolArray, back: BoolArray) -> tuple[FloatArray, FloatArray]:
         best, truck = np.full(len(s), np.inf), np.zeros(len(s))
-        for is_ahead in (True,) if ahead_only else (True, False):
+        for is_ahead in (True, False) if aside else (True,):
             other = order.next_to(np.where(known, group + aside, -1), s, is_ahead=is_ahead)
             free = np.maximum(scale * np.abs(s[other] - s) - 0.5 * (length[other] + length), 0.0)
-            gap = np.where(other >= 0, free, np.inf)
+            # a ramp's lane lies beside nothing before it comes in
+            gap = np.where((other >= 0) & (there | back[other]), free, np.inf)
             closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    lead, lead_is_truck = nearest(0, known, ahead_only=True)
-    left, left_is_truck = nearest(1, lane_on_left)
-    right, right_is_truck = nearest(-1, lane_on_right)
+    lead, lead_is_truck = nearest(0, known, known)
+    left, left_is_truck = nearest(1, lane_on_left, lane_on_right)
+    right, right_is_truck = nearest(-1, lane_on_right, lane_on_left)
     return {
         "lead_distance": lead, "lead_is_truck": lead_is_truck, "left_distance": left, "left_is_truck": left_is_truck,
         "right_distance": right, "right_is_truck": right_is_truck,
