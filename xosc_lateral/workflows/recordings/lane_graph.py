@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
@@ -178,9 +179,12 @@ class RoadLanes:
         next_to = list[tuple[int, float] | None]()
         for is_ahead in (True, False):
             (row,) = order.next_to(group[-1:], middle[-1:], is_ahead=is_ahead).tolist()
+            if row < 0:
+                next_to.append(None)
+                continue
             k = int(others[row])
             free = max(abs(float(middle[k] - middle[-1])) - 0.5 * float(length[k] + length[-1]), 0.0)
-            next_to.append(None if row < 0 else (k, free))
+            next_to.append((k, free))
         return next_to
 
 
@@ -246,20 +250,27 @@ def neighbour_columns(
     inside, piece = piece >= 0, np.maximum(piece, 0)
     part, station, rank, own_scale = graph.stations(piece, middle)
     scale = own_scale * scale
-    pool = pool_of(time, vehicle, step)
-    row = pool.row
-    is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
-    near = find_neighbours(
-        pool.instant * (int(part.max()) + 1) + part[row],
-        np.where(inside, rank - int(rank.min()), -1)[row],
-        pool.moved(station, np.where(inside, part, -1), speed / scale),
-        length[row],
-        is_truck[row],
-        lane_on_left=(graph.left[piece] >= 0)[row],
-        lane_on_right=is_left[piece][row],
-        scale=scale[row],
-    )
-    return {name: values[pool.of_row] for name, values in near.items()}
+    rank = np.where(inside, rank - int(rank.min()), -1)
+    line = np.where(inside, part, -1)
+    row_of, instant, moved, place = at_instants(station, line, speed / scale, time, vehicle, step)
+    del station, line, inside
+    on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
+    on_right[graph.left[on_left]] = True
+    columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
+    begin, n = 0, len(by_time)
+    while begin < n:  # as many instants at a time as have some rows
+        last = instant[by_time[min(begin + BLOCK, n) - 1]]
+        end = int(np.searchsorted(instant, last, side="right", sorter=by_time))
+        rows = by_time[begin:end]
+        row, begin = row_of[rows], end
+        near = find_neighbours(
+            instant[rows] * parts + part[row], rank[row], moved[rows], length[row], is_truck[row],
+            lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
+        )  # fmt: skip
+        for name, values in near.items():
+            columns.setdefault(name, np.empty(n))[rows] = values
+    del row_of, instant, moved, by_time
+    return {name: columns.pop(name)[place] for name in list(columns)}
 
 
 NEIGHBOUR_DISTANCE = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
@@ -344,27 +355,14 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
         span *= 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Pool:
-    """Every vehicle at every instant from its first to its last, those that it misses for a moment too; shape (m,)."""
+def at_instants(
+    along: FloatArray, part: IntArray, speed: FloatArray, time: FloatArray, vehicle: IntArray, step: float
+) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+    """Every vehicle at every instant from its first to its last, those too that it misses for at most `MAX_GAP`.
 
-    row: IntArray  # row of the recording, or of the last one before
-    after: IntArray  # row of the vehicle's next instant with a row; only where `share` is not 0
-    instant: IntArray
-    later: FloatArray  # time of the instant less that of `row` [s]
-    share: FloatArray  # of the way from `row` to the vehicle's next, 0 where the instant is its own [-]
-    of_row: IntArray  # place of each row of the recording in the pool, shape (n,)
-
-    def moved(self, along: FloatArray, part: IntArray, speed: FloatArray) -> FloatArray:
-        """Way along the road at the instants: between two rows of one part of the road, else as fast as before. [m]"""
-        after = self.after
-        between = (self.share > 0.0) & (part[after] == part[self.row])
-        on = along[self.row] + speed[self.row] * self.later
-        return np.where(between, along[self.row] + self.share * (along[after] - along[self.row]), on)
-
-
-def pool_of(time: FloatArray, vehicle: IntArray, step: float) -> Pool:
-    """See `Pool`; instants missing for at most `MAX_GAP` are filled."""
+    Row of the recording, or the last one before; number of the instant; way along the road there: between two rows of
+    one part of the road, else as fast as before [m]; and place of each row of the recording among these, shape (n,).
+    """
     instant, when = instants(time, vehicle, step)
     new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
     row = np.flatnonzero(new)
@@ -380,8 +378,8 @@ def pool_of(time: FloatArray, vehicle: IntArray, step: float) -> Pool:
     known = np.isfinite(times[filled])  # nobody was seen at others
     last, following, filled = last[known], following[known], filled[known]
     later = times[filled] - time[last]
-    share = later / np.maximum(time[following] - time[last], 1e-9)
-    return Pool(
-        np.r_[row, last], np.r_[row, following], np.r_[instant[row], filled], np.r_[when[row] - time[row], later],
-        np.r_[np.zeros(len(row)), np.clip(share, 0.0, 1.0)], np.cumsum(new) - 1,
-    )  # fmt: skip
+    share = np.clip(later / np.maximum(time[following] - time[last], 1e-9), 0.0, 1.0)
+    between = (share > 0.0) & (part[following] == part[last])
+    way = along[last] + np.where(between, share * (along[following] - along[last]), speed[last] * later)
+    moved = along[row] + speed[row] * (when[row] - time[row])
+    return np.r_[row, last], np.r_[instant[row], filled], np.r_[moved, way], np.cumsum(new) - 1

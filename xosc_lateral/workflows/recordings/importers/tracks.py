@@ -20,6 +20,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
@@ -85,30 +86,26 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     lanes = RoadLanes(network)
     if not len(lanes.graph.length):
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
-    x, y = network.header_offset.undo(tracks.x, tracks.y)
-    heading = tracks.heading - network.header_offset.heading
-    place = network.world_to_lane(x, y, heading=heading)
-    piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
-    inside = np.flatnonzero((place.distance <= 0.0) & (place.lane != 0))
-    piece[inside], along[inside] = lanes.place(place.road[inside], place.lane[inside], place.s[inside])
-    there = np.flatnonzero(piece >= 0)
-    where = place.road[there], place.lane[there], place.s[there]
-
-    def known(values: NDArray[Any]) -> FloatArray:
-        column = np.full(len(piece), np.nan)
-        column[there] = values
-        return column
-
-    names = ("curvature", "lane_index", "lane_count", "crossfall", "grade")
-    values: list[NDArray[Any]]
-    values = [network.lane_curvature(*where), *network.lane_index(*where), *network.lean(*where)]
-    columns = dict(zip(names, map(known, values), strict=True))
-    offset, width = np.where(piece >= 0, place.offset, np.nan), known(network.lane_width(*where))
-    agreement = known(np.cos(heading[there] - network.lane_to_world(*where).heading))
-    scale = known(1.0 - network.curvature(where[0], where[2]) * network.lane_centre_t(*where))
-    return PlacedTracks(
-        tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)
-    ), lanes.graph
+    n, names = len(tracks.x), ("curvature", "lane_index", "lane_count", "crossfall", "grade")
+    piece, along, scale = np.full(n, -1), np.zeros(n), np.ones(n)
+    offset, width, agreement, *values = (np.full(n, np.nan) for _ in range(3 + len(names)))
+    columns = dict(zip(names, values, strict=True))
+    for rows in blocks(n):
+        x, y = network.header_offset.undo(tracks.x[rows], tracks.y[rows])
+        heading = tracks.heading[rows] - network.header_offset.heading
+        place = network.world_to_lane(x, y, heading=heading)
+        inside = np.flatnonzero((place.distance <= 0.0) & (place.lane != 0))
+        number, way = lanes.place(place.road[inside], place.lane[inside], place.s[inside])
+        on, inside = number >= 0, inside[number >= 0]
+        where, there = (place.road[inside], place.lane[inside], place.s[inside]), rows.start + inside
+        piece[there], along[there], offset[there] = number[on], way[on], place.offset[inside]
+        width[there] = network.lane_width(*where)
+        agreement[there] = np.cos(heading[inside] - network.lane_to_world(*where).heading)
+        scale[there] = 1.0 - network.curvature(where[0], where[2]) * network.lane_centre_t(*where)
+        seen = network.lane_curvature(*where), *network.lane_index(*where), *network.lean(*where)
+        for column, part in zip(values, seen, strict=True):
+            column[there] = part
+    return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, scale), lanes.graph
 
 
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
@@ -149,8 +146,9 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     jump = same & (np.abs(step) > 0.5 * placed.lane_width)
     lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
     sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
+    del step, same, jump
     columns = {
-        "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+        "drive": pd.Series(tracks.names, dtype=str).take(tracks.vehicle).array,
         "time": np.round(tracks.time, 4),
         "offset": placed.offset,
         "lane_width": placed.lane_width,
