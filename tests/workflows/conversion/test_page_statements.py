@@ -132,7 +132,7 @@ def test_what_other_egos_cause_is_never_told_as_the_scenario_s_own(tmp_path: Pat
     kept = KeptMeaning((), tuple(Comparison((one,), ()) for one in shifts), (own, contact), {})
     assert kept.shifts == shifts
     assert kept.trial_contacts == (f"{contact.what} is new with the offsets (run: {braking})",)
-    lines = tuple(kept.warnings((), {("Slow", "Van")}))
+    lines = tuple(map(str, kept.warnings((), {("Slow", "Van")})))
     assert lines == kept.trial_contacts, "the movement's own warnings tell of the nominal contact"
 
     made = converted(made_enriched(tmp_path), *lines)

@@ -14,6 +14,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.base.names import in_terminal
+from xosc_lateral.base.note import Note, notes
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.files.remote import is_url
@@ -187,9 +188,9 @@ class BatchResult(Result):
         return self._batch.folder
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def messages(self) -> tuple[Note, ...]:
         """What a user has to know of the whole: a shipped profile that one of their own hides, say."""
-        return self._batch.notes
+        return notes(self._batch.notes)
 
     @property
     def failed(self) -> int:

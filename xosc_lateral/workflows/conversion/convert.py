@@ -14,6 +14,7 @@ from typing import Unpack
 from msgspec import structs
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
+from xosc_lateral.base.note import warnings
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
@@ -213,35 +214,33 @@ def check(plan: Plan, written: Written) -> Written:
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warnings = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
     if settings.player_library is not None:
-        warnings += told_by_player(
+        warned += told_by_player(
             settings.player_library, plan.source, (plan.output, best.file.data or b""), source_meaning.runs,
             plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip
     return replace(
-        best, movement=movement, shifts=kept.shifts, warnings=tuple(warnings), trial_contacts=kept.trial_contacts
+        best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts
     )
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
-    movement, file, cut_off = written.movement, written.file, plan.played.motion.cut_off
+    movement, file = written.movement, written.file
     wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
-    warnings = (
-        *(() if cut_off is None else (str(cut_off),)),
-        *map(str, plan.played.motion.doubts),
-        *other_egos(plan.played.scenario, plan.settings, plan.egos),
+    messages = (
+        *plan.played.motion.messages,
+        *warnings(other_egos(plan.played.scenario, plan.settings, plan.egos)),
         *movement.warnings(),
-        *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),
-        *(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
+        *warnings(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
         *file.notes,
-        *written.vehicles.frozen,
+        *warnings(written.vehicles.frozen),
         *written.warnings,
-        *(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
-        *validity_warnings(movement),
-        *((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
+        *warnings(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
+        *warnings(validity_warnings(movement)),
+        *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )
     return Conversion(
         source=plan.source,
@@ -249,7 +248,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         sha256=file.sha256,
         movement=movement,
         provenance=written.provenance,
-        warnings=warnings,
+        messages=messages,
         content=file.data,
         is_replay=plan.is_replay,
         shifts=written.shifts,

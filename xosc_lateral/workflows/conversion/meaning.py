@@ -15,6 +15,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
@@ -262,24 +263,24 @@ class KeptMeaning:
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
+        return tuple(str(one.note) for one in self.changes if one.pair is not None and one.pair not in nominal)
 
-    def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[str]:
-        """A line each: who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
+    def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
+        """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
 
         `known`: contacts in the nominal run that others tell of
         """
         for name in sorted(unmoved & self.smaller.keys()):
-            yield f"'{name}' stays as it is: {CHANGES}"
+            yield Note(f"'{name}' stays as it is: {CHANGES}", is_warning=True, entity=name)
         for name, (factor, everywhere) in sorted(self.smaller.items()):
             if name not in unmoved:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
-                yield f"offsets of '{name}' are {size}{where}: {CHANGES}"
+                yield Note(f"offsets of '{name}' are {size}{where}: {CHANGES}", is_warning=True, entity=name)
         for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
-                yield f"'{name}' {moves} (run: {run})"
+                yield Note(f"'{name}' {moves}", is_warning=True, entity=name, run=run)
         listed = set[tuple[str, str | None]]()
         for shift in self.shifts:
             longer = shift.end - shift.start
@@ -287,12 +288,13 @@ class KeptMeaning:
             is_long = is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration
             if is_long and (shift.event, shift.entity) not in listed:
                 listed.add((shift.event, shift.entity))
-                yield (
+                what = (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
                     f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
-                    f"is another one (run: {shift.run})"
+                    "is another one"
                 )
-        yield from (str(one) for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
+                yield Note(what, is_warning=True, entity=shift.entity, run=shift.run)
+        yield from (one.note for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
 
 
 def keep_meaning(

@@ -20,6 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import REPEATED_RUNS
+from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
@@ -65,7 +66,13 @@ class Change(Struct, frozen=True):
 
     def __str__(self) -> str:
         """One line."""
-        return f"{self.what} {self.how} with the offsets" + (f" (run: {self.run})" if self.run else "")
+        return str(self.note)
+
+    @property
+    def note(self) -> Note:
+        """It as a warning."""
+        what = f"{self.what} {self.how} with the offsets"
+        return Note(what, is_warning=True, entity=self.entity, run=self.run or None)
 
 
 class Comparison(Struct, frozen=True):

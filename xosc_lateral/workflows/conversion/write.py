@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.held import held_at
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
@@ -29,7 +30,7 @@ class Written:
     provenance: ConversionProvenance
     file: WrittenScenario
     shifts: tuple[EventShift, ...] = ()
-    warnings: tuple[str, ...] = ()  # of the check
+    warnings: tuple[Note, ...] = ()  # of the check
     trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
 
     @property

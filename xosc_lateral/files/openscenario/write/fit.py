@@ -61,7 +61,7 @@ def write_converted(
     rewrite_paths(draft, Path(output))
     mark(draft.root, provenance, summary)
     sha256, content, data = write_sealed(Path(output), draft.vertices.document(draft.root), save=save)
-    return WrittenScenario(sha256, content, converted, tuple(draft.removed), data, tuple(draft.notes))
+    return WrittenScenario(sha256, content, converted, data, tuple(draft.notes))
 
 
 def _fit(draft: Draft, converted: Sequence[str], *, is_reactive: bool) -> None:

@@ -16,6 +16,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.limits import REPEATED_RUNS
+from xosc_lateral.base.note import warnings
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -96,7 +97,7 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
         runs = sum(one.path == path.after and one.actor == path.entity for one in draft.motion.actions)
         if runs > REPEATED_RUNS.value:
             what = f"{' / '.join(begun_by.path)}: {REPEATED_RUNS.refusal(runs)}"
-            draft.notes.append(f"'{path.entity}' has no offsets after more of them; {what}")
+            draft.notes += warnings([f"'{path.entity}' has no offsets after more of them; {what}"], entity=path.entity)
         count = min(runs, int(REPEATED_RUNS.value)) + SPARE_ACTS
     for _ in range(count):
         act = build.sub(story, "Act", name=f"{PATH_NAME} {len(story) + 1}")
