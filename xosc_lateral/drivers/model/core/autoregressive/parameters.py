@@ -268,6 +268,8 @@ class DriverState(msgspec.Struct):
 def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
     """Draw n drivers from the population; given a start, each from those found there."""
     coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
+    if start is None:  # nothing to choose by
+        coarse_normal, fine_normal = coarse_normal[:, :1], fine_normal[:, :1]
     coarse = _factor(model.coarse_volatility.between, coarse_normal)
     mixed = model.correlation * coarse_normal + np.sqrt(1.0 - model.correlation**2) * fine_normal
     fine = _factor(model.fine_volatility.between, mixed)
