@@ -157,14 +157,25 @@ class Autoregression(Record, frozen=True, eq=False):
 
     def power(self, frequency: FloatArray) -> FloatArray:
         """Spectral density at frequencies [cycles per step], shape (n,), 0 to 0.5; white noise of variance 1 has 1."""
-        lags = np.arange(1, self.order + 1)
-        gain = 1.0 - np.exp(-2j * np.pi * np.outer(frequency, lags)) @ self.coefficients
+        turns = _turns_on_grid(self.order) if frequency is FREQUENCIES else _turns(frequency, self.order)
+        gain = 1.0 - turns @ self.coefficients
         return np.asarray(self.scale**2 / np.abs(gain) ** 2)
 
     def covariance(self, n_lags: int) -> FloatArray:
         """Autocovariance at lags 0 to n_lags - 1 steps, shape (n_lags,), n_lags <= `GRID` / 2. [square of the unit]"""
         power = self.power(FREQUENCIES)
         return np.asarray(np.fft.irfft(power, GRID)[:n_lags])
+
+
+def _turns(frequency: FloatArray, order: int) -> NDArray[np.complex128]:
+    """By how much waves turn in one step and more, shape (n, order). [-]"""
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, np.arange(1, order + 1))))
+
+
+@lru_cache(maxsize=8)
+def _turns_on_grid(order: int) -> NDArray[np.complex128]:
+    """The same at `FREQUENCIES`, a megabyte for the usual order: fits ask for it hundreds of times."""
+    return _turns(FREQUENCIES, order)
 
 
 def stabilise(coefficients: FloatArray) -> FloatArray:
