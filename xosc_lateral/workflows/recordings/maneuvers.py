@@ -13,6 +13,7 @@ from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, COLUMNS, Maneuvers, fit_maneuvers
 from xosc_lateral.drivers.model.profile import SIDES
 from xosc_lateral.workflows.recordings.encounters import ENCOUNTER_DISTANCE
+from xosc_lateral.workflows.recordings.lane_graph import At, RoadLanes
 from xosc_lateral.workflows.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.workflows.recordings.recordings import read_recording
@@ -27,6 +28,7 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     traffic = read_recording(recording, road=road)
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
+    lanes = RoadLanes(traffic.network)
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
     for vehicle in vehicles:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
@@ -37,7 +39,7 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
         free = float(vehicle.time[0])
         for transition in plan.transitions:
             if transition.lanes and not transition.cut:
-                for name, value in zip(COLUMNS, _facts(vehicle, transition, vehicles), strict=True):
+                for name, value in zip(COLUMNS, _facts(vehicle, transition, vehicles, lanes), strict=True):
                     measured[name].append(value)
                 sides.append(transition.lanes > 0)
                 way = _way_before(vehicle, transition, free)
@@ -52,22 +54,31 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     )  # fmt: skip
 
 
-def _facts(vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion]) -> tuple[float, ...]:
+def _facts(
+    vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], lanes: RoadLanes
+) -> tuple[float, ...]:
     """`COLUMNS` of a lane change."""
     time = vehicle.time
     first, last = (min(int(np.searchsorted(time, at)), len(time) - 1) for at in (transition.start, transition.end))
     speed = float(vehicle.speed[first])
     gap, closing = np.nan, np.nan
-    way = int(vehicle.way(np.array([first]))[0])
-    for other in vehicles:
-        row = int(np.searchsorted(other.time, time[first]))
-        if other is vehicle or row == len(other.time) or other.time[row] - time[first] > BEFORE_STEP:
-            continue
-        if (other.road[row], other.lane[row]) == (vehicle.road[first], vehicle.lane[first]):
-            middle = way * float(other.s[row] - vehicle.s[first]) + other.box.center_x - vehicle.box.center_x
-            free = middle - 0.5 * (other.box.length + vehicle.box.length)
-            if 0.0 < free < min(ENCOUNTER_DISTANCE, np.inf if np.isnan(gap) else gap):
-                gap, closing = free, speed - float(other.speed[row])
+    rows = [(other, int(np.searchsorted(other.time, time[first]))) for other in vehicles]
+    there = [(other, k) for other, k in rows if k < len(other.time) and other.time[k] - time[first] <= BEFORE_STEP]
+    places = [
+        At(
+            int(one.road[k]),
+            int(one.lane[k]),
+            int(one.way(slice(k, k + 1))[0]),
+            float(one.s[k]),
+            one.box.center_x,
+            one.box.length,
+        )
+        for one, k in there
+    ]
+    ahead, _ = lanes.nearest(places, next(k for k, (one, _) in enumerate(there) if one is vehicle))
+    if ahead is not None and ahead[1] < ENCOUNTER_DISTANCE:
+        other, row = there[ahead[0]]
+        gap, closing = ahead[1], speed - float(other.speed[row])
     change, width = float(vehicle.speed[last]) - speed, float(vehicle.lane_width[first])
     return transition.duration, speed, change, width, vehicle.box.length, gap, closing
 
