@@ -26,9 +26,7 @@ RoadLike: TypeAlias = Any
 _KINDS = "a path, bytes, XML text, a file-like object, an lxml tree or a scenariogeneration object"
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _LOGIC_FILE = re.compile(rb"<LogicFile\s[^>]*?filepath\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
-_NAMED = re.compile(
-    rb"<(?:LogicFile|Directory|ScenarioFile)\s[^>]*?(?:file)?path\s*=\s*(?:\"([^\"]*)\"|'([^']*)')"
-)
+_NAMED = re.compile(rb"<(?:LogicFile|Directory|ScenarioFile)\s[^>]*?(?:file)?path\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _ENCODING = re.compile(r"\A(\s*<\?xml[^>]*?)\s+encoding\s*=\s*[\"'](?!utf-?8[\"'])[^\"']*[\"']", re.IGNORECASE)
 
 

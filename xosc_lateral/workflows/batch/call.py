@@ -73,8 +73,9 @@ def convert_many(
     Parameters
     ----------
     scenarios : str, Path, DataFrame, or sequence of paths
-        A file, a folder (searched to the bottom), a glob, a URL (``s3://...``, through fsspec), a table (CSV, Parquet) or frame with a column `scenario` and
-        if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
+        A file, a folder (searched to the bottom), a glob, a URL (``s3://...``, through fsspec), a table (CSV, Parquet)
+        or frame with a column `scenario` and if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of
+        options; or several of them.
     output : str or Path
         Folder or URL; it mirrors the inputs, and holds `manifest.parquet` at the end.
     report : str or Path, optional
@@ -115,7 +116,8 @@ def convert_many(
         folder = output_folder(written)
         whole = plan_batch(here, folder, settings, variants=variants, report=pages, labels=labels)
         if not len(whole):
-            raise FormatError(f"no scenario to convert{_left_out(whole)}", path=", ".join(map(str, inputs[:3])) or output)
+            named = ", ".join(map(str, inputs[:3]))
+            raise FormatError(f"no scenario to convert{_left_out(whole)}", path=named or output)
         batch = whole if shard is None else whole.part(number, parts)
         _refuse_unknown_names(whole)
         # A folder in an output's place is that output's failure alone.
