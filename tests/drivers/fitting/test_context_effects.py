@@ -89,7 +89,8 @@ def test_a_speed_that_only_jitters_acts_on_nothing():
     """Everybody at 24 m/s, known by positions: an effect of that noise would make every row jitter."""
     for seed in range(5):
         rng = np.random.default_rng([seed, 7])
-        runs = [replace(run, context={"speed": rng.normal(24.0, 0.15, len(run))}) for run in smooth_runs(40, 60.0, seed)]
+        still = smooth_runs(40, 60.0, seed)
+        runs = [replace(run, context={"speed": rng.normal(24.0, 0.15, len(run))}) for run in still]
         assert fit_context_effects(runs) == ()
         drives = [replace(run, context={"speed": run.context["speed"] + rng.normal(0.0, 1.0)}) for run in runs]
         assert _shapes(drives), "drives at different speeds are asked"
