@@ -52,6 +52,8 @@ def dossier_page(
         "named is part of it, and its result is looked at."
     )
     page.table(contents.tool)
+    begin("process", "Documentation, process and people")
+    page.table(contents.process)
     begin("versions", "Versions and hashes")
     page.table([{"": name, "version": words} for name, words in versions.items()])
     return page.html({"subject": subject, "versions": dict(versions)})
