@@ -19,6 +19,7 @@ from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
 from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
+from xosc_lateral.world.surroundings.ahead import vehicle_ahead
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
@@ -153,7 +154,8 @@ def _weights(action: PlayedAction, played: Played, maneuvers: Maneuvers) -> Floa
     end = float(vehicle.time[-1]) if action.end is None else action.end
     width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
     left = leads_left(vehicle, played.network, action.start, end)
-    return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width)
+    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, played.network)
+    return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width, gap=gap)
 
 
 def _distribution(

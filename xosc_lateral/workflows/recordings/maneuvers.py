@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,12 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, COLUMNS, Maneuvers, fit_maneuvers
 from xosc_lateral.drivers.model.profile import SIDES
-from xosc_lateral.workflows.recordings.encounters import ENCOUNTER_DISTANCE
 from xosc_lateral.workflows.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.workflows.recordings.recordings import read_recording
 from xosc_lateral.world.motion.nominal import EntityMotion
+from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.surroundings.ahead import vehicle_ahead
 
 BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""
@@ -26,9 +27,16 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     """Maneuver profile of a recording; raises `FormatError`, `NotEnoughDataError`."""
     traffic = read_recording(recording, road=road)
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
+    return maneuvers_of(vehicles, vehicles, traffic.network, recording.name)
+
+
+def maneuvers_of(
+    drivers: Iterable[EntityMotion], vehicles: Sequence[EntityMotion], network: RoadNetwork, recording: str
+) -> Maneuvers:
+    """Maneuver profile of some drivers among vehicles in the lanes of a road; raises `NotEnoughDataError`."""
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
-    for vehicle in vehicles:
+    for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
         if plan.is_played:
             continue
@@ -37,7 +45,8 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
         free = float(vehicle.time[0])
         for transition in plan.transitions:
             if transition.lanes and not transition.cut:
-                for name, value in zip(COLUMNS, _facts(vehicle, transition, vehicles), strict=True):
+                facts = _facts(vehicle, transition, vehicles, network)
+                for name, value in zip(COLUMNS, facts, strict=True):
                     measured[name].append(value)
                 sides.append(transition.lanes > 0)
                 way = _way_before(vehicle, transition, free)
@@ -48,28 +57,19 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     before = {side: np.array(rows) for side, rows in ways.items()}
     return fit_maneuvers(
         columns, np.array(sides), before=before, hours=max(keeping, 1.0) / 3600.0, aborted=aborted // 2,
-        recording=recording.name,
+        recording=recording,
     )  # fmt: skip
 
 
-def _facts(vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion]) -> tuple[float, ...]:
+def _facts(
+    vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], network: RoadNetwork
+) -> tuple[float, ...]:
     """`COLUMNS` of a lane change."""
-    time = vehicle.time
-    first, last = (min(int(np.searchsorted(time, at)), len(time) - 1) for at in (transition.start, transition.end))
-    speed = float(vehicle.speed[first])
-    gap, closing = np.nan, np.nan
-    way = int(vehicle.way(np.array([first]))[0])
-    for other in vehicles:
-        row = int(np.searchsorted(other.time, time[first]))
-        if other is vehicle or row == len(other.time) or other.time[row] - time[first] > BEFORE_STEP:
-            continue
-        if (other.road[row], other.lane[row]) == (vehicle.road[first], vehicle.lane[first]):
-            middle = way * float(other.s[row] - vehicle.s[first]) + other.box.center_x - vehicle.box.center_x
-            free = middle - 0.5 * (other.box.length + vehicle.box.length)
-            if 0.0 < free < min(ENCOUNTER_DISTANCE, np.inf if np.isnan(gap) else gap):
-                gap, closing = free, speed - float(other.speed[row])
-    change, width = float(vehicle.speed[last]) - speed, float(vehicle.lane_width[first])
-    return transition.duration, speed, change, width, vehicle.box.length, gap, closing
+    ends = np.searchsorted(vehicle.time, (transition.start, transition.end))
+    first, last = np.minimum(ends, len(vehicle.time) - 1).tolist()
+    speed, width = float(vehicle.speed[first]), float(vehicle.lane_width[first])
+    ahead = vehicle_ahead(vehicle, first, vehicles, network)
+    return transition.duration, speed, float(vehicle.speed[last]) - speed, width, vehicle.box.length, *ahead
 
 
 def _way_before(vehicle: EntityMotion, transition: Transition, free: float) -> FloatArray | None:
