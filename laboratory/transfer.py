@@ -233,9 +233,7 @@ def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequenc
         }  # fmt: skip
 
 
-def results(
-    wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Sequence[Views]
-) -> Iterator[dict[str, Any]]:
+def results(wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
     """A row for each home, detector and goal."""
     goals = [read_goal(text) for text in GOALS]
     tested = real_half(wheel, 1 - half)
