@@ -135,9 +135,15 @@ def convert_scenario(
 
 def carry_out(plan: Plan) -> Conversion:
     """Sample, write, check."""
-    sampled = sample(plan)
-    written = write(plan, sampled)
-    checked = check(plan, written)
+    sampled, lifelike = sample(plan), plan.settings.lane_changes is LaneChanges.LIFELIKE
+    checked = check(plan, write(plan, sampled, lifelike=lifelike))
+    across = {path.entity for path in checked.paths if path.instead}
+    if across and checked.otherwise:
+        plain = check(plan, write(plan, sampled, lifelike=False))
+        why = "with the way that drivers take, what happens would happen otherwise"
+        if plain.otherwise < checked.otherwise:
+            lines = (f"lane changes of '{name}' stay as written: {why}" for name in sorted(across))
+            checked = replace(plain, stays=(*checked.stays, *lines))
     if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
         write_atomically(plan.output, checked.file.data)
     return _conversion(plan, checked)
@@ -218,8 +224,9 @@ def check(plan: Plan, written: Written) -> Written:
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip
     return replace(
-        best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts
-    )
+        best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
+        stays=written.stays, otherwise=len(kept.changes) + len(kept.smaller),
+    )  # fmt: skip
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:
@@ -234,7 +241,8 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *file.notes,
         *warnings(written.vehicles.frozen),
         *written.warnings,
-        *warnings(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
+        *warnings(stay_as_written(movement) if wants_lifelike else ()),
+        *warnings(written.stays),
         *warnings(validity_warnings(movement)),
         *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )

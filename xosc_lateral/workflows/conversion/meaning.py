@@ -290,8 +290,7 @@ class KeptMeaning:
                 listed.add((shift.event, shift.entity))
                 what = (
                     f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
-                    f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way from beside the middle "
-                    "is another one"
+                    f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way across is another one"
                 )
                 yield Note(what, is_warning=True, entity=shift.entity, run=shift.run)
         yield from (one.note for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
@@ -311,7 +310,7 @@ def keep_meaning(
 
     def applied(some: Sizes) -> list[OffsetPath]:
         driven = [resized(path, some[k]) if k in some else path for k, path in enumerate(paths)]
-        return [path for path in driven if path.pieces]
+        return [path for path in driven if path.pieces or path.settles]
 
     output, comparisons = attempt(paths, inf)
     changes = _changes(comparisons)
@@ -359,7 +358,9 @@ def _blamed(
         theirs = [k for k, path in enumerate(paths) if path.entity == change.entity]
         order += sorted(theirs, key=lambda k: (begins(paths[k]) > change.time, -begins(paths[k])))
     order += range(len(paths))
-    free = (k for k in order if sizes.get(k, 1.0) > SIZES[-1] and (k, len(changes)) not in stuck)
+    free = (
+        k for k in order if sizes.get(k, 1.0) > SIZES[-1] and (k, len(changes)) not in stuck and not paths[k].instead
+    )
     return next(free, None)
 
 

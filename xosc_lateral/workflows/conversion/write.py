@@ -32,6 +32,8 @@ class Written:
     shifts: tuple[EventShift, ...] = ()
     warnings: tuple[Note, ...] = ()  # of the check
     trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
+    stays: tuple[str, ...] = ()  # lane changes of these paths' entities that stay as written, a line each
+    otherwise: int = 0  # what happens otherwise in the check, and whose moves are smaller for that
 
     @property
     def with_lane_offsets(self) -> frozenset[str]:
@@ -39,8 +41,11 @@ class Written:
         return frozenset(path.entity for path in self.paths)
 
 
-def write(plan: Plan, sampled: Enriched) -> Written:
-    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
+def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
+    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked.
+
+    `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can.
+    """
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
     place = leads_from(plan.source, plan.output).parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
@@ -62,8 +67,9 @@ def write(plan: Plan, sampled: Enriched) -> Written:
         content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    paths = [path for entity in reactive for path in paths_of(entity, plan)]
-    return write_with(paths, plan, sampled, vehicles, provenance)
+    found = [paths_of(entity, plan, lifelike=lifelike) for entity in reactive]
+    written = write_with([path for paths, _ in found for path in paths], plan, sampled, vehicles, provenance)
+    return replace(written, stays=tuple(line for _, lines in found for line in lines))
 
 
 def write_with(

@@ -19,7 +19,7 @@ from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.note import warnings
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import Draft
+from xosc_lateral.files.openscenario.write.draft import Draft, source_of
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
@@ -55,8 +55,12 @@ def add_paths(
     moving = moving_entities(draft, trajectories)
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
+    across = [(path, _element_of(path, draft)) for path in paths if path.instead]
+    for number, (path, change) in enumerate(across, start=1):
+        _lead_across(change, f"{PATH_NAME} across {number}", path, draft)
     for path in paths:
-        _add_acts(story, path, draft, lateral)
+        if not path.instead:
+            _add_acts(story, path, draft, lateral)
     _place_aside(draft, paths)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
@@ -68,6 +72,26 @@ def add_paths(
     inline_maneuvers(draft, referred)
     maneuvers.replace()
     return tuple(dict.fromkeys([*moving, *(path.entity for path in paths)]))
+
+
+def _element_of(path: OffsetPath, draft: Draft) -> etree._Element:
+    """The lane change that a path leads across in place of, in the tree before anything in it is changed."""
+    actions = ((at.path, action) for at in draft.scenario.storyboard.events() for action in at.event.actions)
+    action = next(action for names, action in actions if (*names, action.name) == path.after)
+    return next(source_of(action, draft.scenario, draft.root).iter("{*}LaneChangeAction"))
+
+
+def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
+    """Event, action and trigger stay; the player moves it along the path."""
+    lateral = change.getparent()
+    assert lateral is not None
+    private = lateral.getparent()
+    assert private is not None
+    routing = etree.Element("RoutingAction")
+    _follow(build.sub(routing, "FollowTrajectoryAction"), name, path, path.pieces[0], draft)
+    place = private.index(lateral)
+    private.remove(lateral)
+    build.insert_indented(private, place, routing)
 
 
 def _place_aside(draft: Draft, paths: Sequence[OffsetPath]) -> None:
@@ -111,18 +135,38 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
 def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
     """A trajectory each: the reference player finds the places of vertices when it starts, so it may run once."""
     maneuver, begins = build.maneuver(act, f"{name} path", path.entity), ("act", name, "runningState")
-    for number, piece in enumerate(path.pieces, start=1):
-        event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, draft.version)
-        action = build.private_action(event, f"{name}.{number} action")
-        follow = build.sub(action, "RoutingAction/FollowTrajectoryAction")
-        holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
-        polyline = build.sub(build.sub(holder, "Trajectory", name=f"{name}.{number}", closed="false"), "Shape/Polyline")
-        draft.vertices.add(polyline, _vertices(path, piece))
-        build.sub(follow, "TimeReference/None")
-        build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
-        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
-        build.state_condition(build.sub(event, "StartTrigger/ConditionGroup"), *begins, wait)
+
+    def event(number: int, wait: float) -> etree._Element:
+        nonlocal begins
+        added = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, draft.version)
+        action = build.private_action(added, f"{name}.{number} action")
+        build.state_condition(build.sub(added, "StartTrigger/ConditionGroup"), *begins, wait)
         begins = "event", f"{name}.{number}", "completeState"
+        return action
+
+    if path.settles is not None:
+        _settle(event(0, FIRST_WAIT), path, *path.settles)
+    for number, piece in enumerate(path.pieces, start=1):
+        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
+        follow = build.sub(event(number, wait), "RoutingAction/FollowTrajectoryAction")
+        _follow(follow, f"{name}.{number}", path, piece, draft)
+
+
+def _settle(action: etree._Element, path: OffsetPath, aside: float, within: float) -> None:
+    """From wherever it is to a place in its lane, by the distance driven."""
+    change = build.sub(action, "LateralAction/LaneChangeAction", targetLaneOffset=build.decimal(aside, 4))
+    dynamics = {"dynamicsShape": "sinusoidal", "dynamicsDimension": "distance", "value": build.decimal(within, 1)}
+    build.sub(change, "LaneChangeActionDynamics", **dynamics)
+    build.sub(change, "LaneChangeTarget/RelativeTargetLane", entityRef=path.entity, value="0")
+
+
+def _follow(follow: etree._Element, name: str, path: OffsetPath, piece: PathPiece | Bridge, draft: Draft) -> None:
+    """Along a path, without times."""
+    holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
+    polyline = build.sub(build.sub(holder, "Trajectory", name=name, closed="false"), "Shape/Polyline")
+    draft.vertices.add(polyline, _vertices(path, piece))
+    build.sub(follow, "TimeReference/None")
+    build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
 
 
 def _vertices(path: OffsetPath, piece: PathPiece | Bridge) -> build.FreeVertices:
