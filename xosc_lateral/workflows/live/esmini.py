@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError, SimulationError
+from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -23,7 +24,7 @@ from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, ToldPlace
 from xosc_lateral.workflows.live.loop import Row
-from xosc_lateral.workflows.live.paths import CLOCK_TOLERANCE, Moves, leading_time, left_of_gap, pace_of
+from xosc_lateral.workflows.live.paths import CLOCK_TOLERANCE, Moves, leading_time, left_of_gap
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.workflows.live.under_test import UnderTest
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
@@ -170,7 +171,7 @@ class EsminiTraffic:
         for name, state in self._objects():
             if (known := self._ledger.vehicles.get(name)) is None:
                 continue
-            pace = float(pace_of(np.array([state.speed]), np.zeros(1))[0])
+            pace = float(clock_rate(np.array([state.speed]))[0])
             if name in busy and known.steered:  # begun in this step, in which the driver's place still counts
                 if (gap := self._ledger.dropped(known, state)) is None:
                     continue
