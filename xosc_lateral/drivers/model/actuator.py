@@ -34,8 +34,9 @@ motorway profiles at 33 m/s, it stays below 1 m/s2 (`laboratory.surprises`).
 """
 
 LARGEST_SPEED, LARGEST_ACCELERATION = ACCELERATION_LIMIT**2 / JERK_LIMIT, ACCELERATION_LIMIT
-"""`plausibility`'s acceleration, and the speed that it comes to where it rises and falls again at the largest jerk. From
-40 km/h on, that turns a car against its lane by 9 degrees at most; below, its clock turns it by 3. [m/s], [m/s2]"""
+"""`plausibility`'s acceleration, and the speed that it comes to where it rises and falls again at the largest jerk.
+
+From 40 km/h on, that turns a car against its lane by 9 degrees at most; below, its clock does by 3. [m/s], [m/s2]"""
 
 IMPOSSIBLE_ACCELERATION = GRAVITY
 """More than a tyre's grip on a dry road. [m/s2]"""
