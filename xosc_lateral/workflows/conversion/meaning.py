@@ -59,9 +59,8 @@ STANDING_TIME = 2.0
 CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 """How fast they do so. [m/s2]"""
 
-LONGER = 1.5
-"""Times the longest of these runs, for which offsets last: an ego at 0.7 times its speed comes to a place after 1.43
-times as long, one at 0.8 times after 1.25 times. [-]"""
+LONGER = 1.3
+"""Times the longest of these runs, for which offsets last: some egos come to a place later still. [-]"""
 LEAST_TIME = 60.0
 """For which they do at least: where an end hangs on what a vehicle under test does, it may come late. [s]"""
 TRIAL_STEP = 0.05
@@ -98,15 +97,15 @@ Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
 
 
-OTHER_RUNS = ("ego at 0.8 times its speed", "ego at 1.2 times its speed", "ego that brakes to a stop")  # of `_drives`
+OTHER_RUNS = ("ego at 0.7 times its speed", "ego at 1.3 times its speed", "ego that brakes to a stop")  # of `_drives`
 
 
 def _drives(speed: float) -> tuple[Speeds, ...]:
     """Ways to drive, beside the nominal one: slower, faster, to a stop and on."""
     stopped = BRAKING_START + speed / BRAKING_RATE + STANDING_TIME
     return (
-        ((CHANGE_START, 0.8, CHANGE_RATE),),
-        ((CHANGE_START, 1.2, CHANGE_RATE),),
+        ((CHANGE_START, 0.7, CHANGE_RATE),),
+        ((CHANGE_START, 1.3, CHANGE_RATE),),
         ((BRAKING_START, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE)),
     )
 
