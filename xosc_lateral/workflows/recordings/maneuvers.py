@@ -36,7 +36,7 @@ def maneuvers_of(
 ) -> Maneuvers:
     """Maneuver profile of some drivers among vehicles in the lanes of a road; raises `NotEnoughDataError`."""
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
-    lanes = RoadLanes(traffic.network)
+    lanes = RoadLanes(network)
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
     for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
