@@ -68,14 +68,14 @@ class Given:
 def half_of(scenes: Iterable[Scene], half: int) -> Iterator[Scene]:
     """Every other vehicle of each scene, by a hash of its name."""
     for scene in scenes:
-        tracks = tuple(track for track in scene.tracks if _half(track.name) == half)
+        tracks = tuple(track for track in scene.tracks if in_half(track.name, half))
         if tracks:
             yield replace(scene, tracks=tracks)
 
 
-def _half(name: str) -> int:
+def in_half(name: str, half: int) -> bool:
     """Of a vehicle of the recording, whose drive's name ends with the track's."""
-    return crc32(name[-10:].encode()) % 2
+    return crc32(name[-10:].encode()) % 2 == half
 
 
 def seen(scenes: Iterable[Scene], sensor: Sensor = PERFECT_SENSOR) -> Views:

@@ -1,46 +1,66 @@
 """Detectors set up on nominal, lifelike and real traffic, tried on real vehicles that had no part in it.
 
-    python -m laboratory.transfer WHEEL [--seeds 0 1 ...] [--results FILE.jsonl] [--write PAGE.md]
+    python -m laboratory.transfer WHEEL [--openacc FILE...] [--seeds 0 1 ...] [--results FILE.jsonl] [--write PAGE.md]
 
-WHEEL is `tasi-0.15.4-py3-none-any.whl`. Both halves of the recording's vehicles are home once, and tested once.
-Nominal and lifelike homes are the same scenarios: our templates with drawn durations of lane changes; lifelike ones are
-driven by a profile of the home half. Results are added to FILE as they come; `docs/validation/detectors.md`.
+WHEEL is `tasi-0.15.4-py3-none-any.whl`; FILEs are runs of OpenACC's AstaZero campaign. Both halves of the recording's
+vehicles are home once, and tested once. Nominal and lifelike homes are the same scenarios: our templates, varied like
+the home half's lane changes (`fit --maneuvers`, `vary --like`); lifelike ones are driven by a profile of that half, and
+seen through its band (`detect --band-of`; "unsmoothed": as they are). GNSS runs hold no cut-in: alarms there are false.
+Results are added to FILE as they come; `docs/validation/detectors.md`.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
-from collections.abc import Iterable, Iterator, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 import xosc_lateral as xl
-from laboratory.detectors import _half, drive_table, half_of, recorded
+from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
+from laboratory.shortcut import area, moments_of
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
+from xosc_lateral.workflows.detection.band import keeping_spectrum
+from xosc_lateral.workflows.detection.call import seen_through
 from xosc_lateral.workflows.detection.detectors import Detector, LateralSpeed, TimeToLine, WanderingZone
-from xosc_lateral.workflows.detection.logistic import ROW_STRIDE, Logistic, features, rows_to_train_on, train
-from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, View, views_of
+from xosc_lateral.workflows.detection.logistic import (
+    ROW_STRIDE,
+    Logistic,
+    features,
+    fit_regression,
+    rows_to_train_on,
+    train,
+)
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor, View, views_of
 from xosc_lateral.workflows.detection.scoring import Tally
 from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
 from xosc_lateral.workflows.detection.tuning import Learner, Views, carried, out_of_fold, read_goal, scored
+from xosc_lateral.workflows.recordings.maneuvers import maneuvers_of
+from xosc_lateral.workflows.recordings.recorded import place_tracks
+from xosc_lateral.workflows.recordings.recordings import read_recording
 
 FloatArray = NDArray[np.float64]
 
 SCENARIOS = {"cut-in": 20, "overtake-truck": 20, "dense-traffic": 4}
 """Templates, and how many of each: 68 lane changes."""
-DURATIONS = (4.0, 10.0)
-"""Of lane changes, drawn evenly. [s]"""
 GOALS = ("20/h", "95%")
+HOMES = ("nominal", "lifelike", "real")
 RULES: Sequence[Detector] = (LateralSpeed(), WanderingZone(), TimeToLine())
 WINDOW = round(2.0 / STEP)
 """Of the network. [rows]"""
+MOST_ROWS = 20_000
+"""Of each class, that trees and networks are trained on. [-]"""
 
 
 # ---- learners --------------------------------------------------------------------------------------------------------
@@ -82,6 +102,7 @@ class Learnt(Detector):
 
 def learner_of(name: str, seed: int) -> Learner:
     from sklearn.ensemble import HistGradientBoostingClassifier
+    from sklearn.exceptions import ConvergenceWarning
     from sklearn.neural_network import MLPClassifier
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -97,17 +118,20 @@ def learner_of(name: str, seed: int) -> Learner:
             positive.append(changing)
         x, y = np.concatenate(columns), np.concatenate(positive)
         rng = np.random.default_rng(seed)
+        keeping = rng.choice(np.flatnonzero(~y), min(MOST_ROWS, int((~y).sum())), replace=False)
+        changing = rng.choice(np.flatnonzero(y), len(keeping))  # both classes weigh the same
+        rows = np.concatenate([keeping, changing])
         if name == "boosted trees":
-            weight = np.where(y, len(y) / (2.0 * y.sum()), len(y) / (2.0 * (~y).sum()))
             trees = HistGradientBoostingClassifier(
                 max_iter=80, max_leaf_nodes=15, l2_regularization=1.0, random_state=seed
             )
-            return Learnt(name, trees.fit(x, y, sample_weight=weight), columns_of)
-        keeping = rng.choice(np.flatnonzero(~y), min(20_000, int((~y).sum())), replace=False)
-        changing = rng.choice(np.flatnonzero(y), len(keeping))  # both classes weigh the same
-        rows = np.concatenate([keeping, changing])
-        network = MLPClassifier((24, 12), alpha=1e-3, max_iter=15, batch_size=256, random_state=seed)
-        return Learnt(name, make_pipeline(StandardScaler(), network).fit(x[rows], y[rows]), columns_of)
+            return Learnt(name, trees.fit(x[rows], y[rows]), columns_of)
+        network = MLPClassifier(
+            (24, 12), alpha=1e-3, max_iter=15, batch_size=1024, learning_rate_init=4e-3, random_state=seed
+        )
+        with warnings.catch_warnings():  # so many rounds, and no more
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            return Learnt(name, make_pipeline(StandardScaler(), network).fit(x[rows], y[rows]), columns_of)
 
     return learn
 
@@ -116,110 +140,204 @@ LEARNERS = ("logistic", "boosted trees", "network, 2 s")
 
 
 # ---- homes -----------------------------------------------------------------------------------------------------------
-def written_scenarios(folder: Path, seed: int) -> None:
-    """Templates with drawn durations of lane changes."""
-    rng = np.random.default_rng((74, seed))
+@cache
+def profile_of(wheel: Path, half: int) -> xl.DriverProfile:
+    """Drivers of a half of the recording, and their lane changes."""
+    table = drive_table(wheel)
+    fitted = xl.fit(table[[in_half(name, half) for name in table["drive"]]], name=f"half-{half}")
+    traffic = read_recording(wheel)
+    vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
+    drivers = [one for one in vehicles if in_half(one.name, half)]
+    return replace(fitted, maneuvers=maneuvers_of(drivers, vehicles, traffic.network, traffic.name))
+
+
+@cache
+def real_half(wheel: Path, half: int) -> Views:
+    return views_without_observers(half_of(recorded(wheel), half))
+
+
+def varied_scenarios(folder: Path, profile: Path, seed: int) -> Path:
+    """Templates with lane changes like a profile's: the folder of their parameter distributions."""
     for name, count in SCENARIOS.items():
-        for number in range(count):
-            xl.write_template(
-                name, folder / f"{name}-{number}", lane_change_time=round(float(rng.uniform(*DURATIONS)), 1)
-            )
+        scenario, _ = xl.write_template(name, folder / "templates" / name)
+        xl.vary(scenario, folder / "home" / name, like=profile, count=count, seed=seed)
+    return folder / "home"
 
 
-def views_without_observers(scenes: Iterable[Scene]) -> list[tuple[Scene, list[View]]]:
-    return [(scene, views_of(scene, PERFECT_SENSOR, 0, with_observers=False)) for scene in scenes]
+def views_without_observers(scenes: Iterable[Scene], sensor: Sensor = PERFECT_SENSOR) -> Views:
+    return [(scene, views_of(scene, sensor, 0, with_observers=False)) for scene in scenes]
 
 
-def homes_of(wheel: Path, half: int, seed: int, folder: Path) -> Iterator[tuple[str, Views]]:
-    """Nominal, lifelike and real."""
-    profile = folder / f"half-{half}.json"
-    if not profile.exists():
-        table = drive_table(wheel)
-        xl.write_profile(xl.fit(table[[_half(name) == half for name in table["drive"]]], name="half"), profile)
-    scenarios = folder / f"scenarios-{seed}"
-    if not scenarios.exists():
-        written_scenarios(scenarios, seed)
-    settings = SourceSettings(ConvertSettings.of(seed=seed), 1, (str(profile),), "none")
-    nominal, lifelike = sources_of(scenarios, settings)
-    yield "nominal", views_without_observers(checked(nominal))
-    yield "lifelike", views_without_observers(checked(lifelike))
-    yield "real", views_without_observers(half_of(recorded(wheel), half))
+def homes_of(wheel: Path, half: int, seed: int, names: Sequence[str]) -> Iterator[tuple[str, Views]]:
+    """Those of `HOMES` that are asked for, and "unsmoothed"."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        xl.write_profile(profile_of(wheel, half), folder / "profile.json")
+        scenarios = varied_scenarios(folder, folder / "profile.json", seed)
+        convert = dataclasses.replace(ConvertSettings.of(seed=seed, allow=[str(folder)]), step=STEP)  # as it is played
+        nominal, lifelike = sources_of(scenarios, SourceSettings(convert, 1, (str(folder / "profile.json"),), "none"))
+        if "nominal" in names:
+            yield "nominal", views_without_observers(checked(nominal))
+        if {"lifelike", "unsmoothed"} & set(names):
+            scenes = list(checked(lifelike))
+            band = keeping_spectrum((one for scene in half_of(recorded(wheel), half) for one in scene.tracks), "home")
+            for home, sensor in (
+                ("lifelike", seen_through(band, scenes, PERFECT_SENSOR)), ("unsmoothed", PERFECT_SENSOR),
+            ):  # fmt: skip
+                if home in names:
+                    yield home, views_without_observers(scenes, sensor)
+    if "real" in names:
+        yield "real", real_half(wheel, half)
 
 
-def at(detector: Detector, views: Views, held: str) -> dict[str, float]:
-    """What it does on held-out vehicles."""
-    tally = Tally(detector, held)
+class AtLimits(Detector):
+    """A detector at some thresholds alone, in order."""
+
+    def __init__(self, detector: Detector, limits: Sequence[float]) -> None:
+        self.detector, self.chosen_limits = detector, np.array(limits)
+        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
+
+    @property
+    def limits(self) -> FloatArray:
+        """See `Detector`."""
+        return self.chosen_limits
+
+    @property
+    def chosen(self) -> int:
+        """See `Detector`."""
+        return 0
+
+    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
+        """See `Detector`."""
+        return self.detector.scores(scene, views)
+
+
+def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
+    """What it does on held-out vehicles, and on runs that hold no cut-in, at the limit of each goal."""
+    ordered = np.unique([*limits.values()])
+    tally = Tally(AtLimits(detector, ordered), "held out")
     for scene, several in views:
         tally.add(scene, several)
-    curve, k = tally.curve(), detector.chosen
-    low, high = curve.rate_interval()[:, k]
-    return {
-        "rate": float(curve.rate[k]), "low": float(low), "high": float(high), "seen": float(curve.in_time[k]),
-        "lead": float(curve.lead(0.5)[k]),
-    }  # fmt: skip
+    curve, low_high, calm = tally.curve(), tally.curve().rate_interval(), []
+    for run in runs:
+        alone = Tally(AtLimits(detector, ordered), "run")
+        for scene, several in run:
+            alone.add(scene, several)
+        calm.append(alone.curve().rate)
+    for goal, limit in limits.items():
+        k = int(np.searchsorted(ordered, limit))
+        yield {
+            "goal": goal, "threshold": detector.threshold_of(limit), "rate": float(curve.rate[k]),
+            "low": float(low_high[0, k]), "high": float(low_high[1, k]), "seen": float(curve.in_time[k]),
+            "lead": float(curve.lead(0.5)[k]), "runs": [float(rates[k]) for rates in calm],
+        }  # fmt: skip
 
 
-def results(wheel: Path, half: int, seed: int, folder: Path) -> Iterator[dict[str, Any]]:
+def results(wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
     """A row for each home, detector and goal."""
     goals = [read_goal(text) for text in GOALS]
-    tested = views_without_observers(half_of(recorded(wheel), 1 - half))
-    for home, views in homes_of(wheel, half, seed, folder):
+    tested = real_half(wheel, 1 - half)
+    for home, views in homes_of(wheel, half, seed, homes):
+        key = {"half": half, "seed": seed, "home": home}
         for one in (*RULES, *LEARNERS):
             name = one.title() if isinstance(one, Detector) else one
-            if home == "real" and isinstance(one, Detector) and seed:
+            if home == "real" and seed and (isinstance(one, Detector) or one == "logistic"):
                 continue  # nothing in it is drawn
             if isinstance(one, Detector):
                 trained, at_home = one, scored(one, views)
             else:
                 trained, at_home = out_of_fold(learner_of(one, seed), views, home)
-            chosen: dict[str, Detector] = {goal.text: carried(goal, trained, at_home, home) for goal in goals}
+            chosen = {goal.text: carried(goal, trained, at_home, home) for goal in goals}
+            limits = {text: float(each.limits[each.chosen]) for text, each in chosen.items()}
             if not isinstance(one, Detector):
-                chosen["p = 0.5"] = trained
-            for goal_text, detector in chosen.items():
-                key = {"half": half, "seed": seed, "home": home, "detector": name, "goal": goal_text}
-                yield {**key, "threshold": detector.threshold, **at(detector, tested, "held out")}
+                limits["p = 0.5"] = 0.0
+            for found in at(trained, limits, tested, runs):
+                yield {**key, "detector": name, **found}
+        if home != "nominal":
+            yield {**key, "detector": "shortcut", "goal": "AUC", **told(views, tested)}
+
+
+def told(home: Views, tested: Views) -> dict[str, float]:
+    """AUC of the seconds before a lane change, learnt at home and tried on the tested vehicles, and the other way."""
+    own, real = moments_of(home), moments_of(tested)
+    fits = [fit_regression(each.columns, each.positive) for each in (own, real)]
+    return {
+        "there": area(fits[0].log_odds(real.columns), real.positive),
+        "back": area(fits[1].log_odds(own.columns), own.positive),
+    }
 
 
 def lines_of(rows: Sequence[dict[str, Any]], goal: str) -> str:
-    """Means over seeds and halves; in brackets the smallest and the largest lower and upper end of a 95 % interval."""
+    """Means over seeds and halves; in brackets those of both ends of a 95 % interval by vehicle."""
     found = [row for row in rows if row["goal"] == goal]
-    homes, names = ("nominal", "lifelike", "real"), list(dict.fromkeys(row["detector"] for row in found))
-    lines = ["| detector | " + " | ".join(f"set up on {home}" for home in homes) + " |", "|---" * 4 + "|"]
+
+    def cell(each: Sequence[dict[str, Any]]) -> str:
+        rate, low, high, seen, lead = (float(np.nanmean([row[key] for row in each]))
+                                       for key in ("rate", "low", "high", "seen", "lead"))  # fmt: skip
+        return f"{rate:.0f} ({low:.0f} to {high:.0f}); {100.0 * seen:.0f} %; {lead:.2f} s"
+
+    return _table(found, cell)
+
+
+def run_lines(rows: Sequence[dict[str, Any]]) -> str:
+    """False alarms an hour on runs without cut-ins at `GOALS[0]`: means, and the least and most of a run."""
+
+    def cell(each: Sequence[dict[str, Any]]) -> str:
+        runs = np.mean([row["runs"] for row in each], axis=0)
+        return f"{runs.mean():.0f} ({runs.min():.0f} to {runs.max():.0f})"
+
+    return _table([row for row in rows if row["goal"] == GOALS[0]], cell)
+
+
+def told_lines(rows: Sequence[dict[str, Any]]) -> str:
+    """The shortcut test from one kind of traffic to another."""
+    lines = ["| learnt on | tried on held-out real vehicles | learnt there, tried on it |", "|---" * 3 + "|"]
+    for home in dict.fromkeys(row["home"] for row in rows if row["goal"] == "AUC"):
+        each = [row for row in rows if (row["goal"], row["home"]) == ("AUC", home)]
+        there, back = ([row[key] for row in each] for key in ("there", "back"))
+        lines.append(f"| {home} | {_spread(there)} | {_spread(back)} |")
+    return "\n".join(lines)
+
+
+def _spread(values: Sequence[float]) -> str:
+    return f"{np.mean(values):.2f} ({min(values):.2f} to {max(values):.2f})"
+
+
+def _table(found: Sequence[dict[str, Any]], cell: Callable[[Sequence[dict[str, Any]]], str]) -> str:
+    homes, names = (list(dict.fromkeys(row[key] for row in found)) for key in ("home", "detector"))
+    lines = ["| detector | " + " | ".join(f"set up on {home}" for home in homes) + " |"]
+    lines.append("|---" * (1 + len(homes)) + "|")
     for name in names:
-        cells = []
-        for home in homes:
-            each = [row for row in found if (row["detector"], row["home"]) == (name, home)]
-            if not each:
-                cells.append("-")
-                continue
-            rates = [row["rate"] for row in each]
-            low, high = min(row["low"] for row in each), max(row["high"] for row in each)
-            seen, lead = (np.nanmean([row[key] for row in each]) for key in ("seen", "lead"))
-            cells.append(f"{np.mean(rates):.0f} ({low:.0f} to {high:.0f}); {100.0 * seen:.0f} %; {lead:.2f} s")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+        each = [[row for row in found if (row["detector"], row["home"]) == (name, home)] for home in homes]
+        lines.append(f"| {name} | " + " | ".join(cell(one) if one else "-" for one in each) + " |")
     return "\n".join(lines)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path)
+    parser.add_argument("--openacc", type=Path, nargs="+", default=[], metavar="FILE")
     parser.add_argument("--seeds", type=int, nargs="*", default=[0, 1, 2, 3, 4])
     parser.add_argument("--halves", type=int, nargs="*", default=[0, 1])
+    parser.add_argument("--homes", nargs="+", choices=(*HOMES, "unsmoothed"), default=HOMES)
     parser.add_argument("--results", type=Path, default=Path("transfer.jsonl"))
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    with TemporaryDirectory() as name:
-        for seed in args.seeds:
-            for half in args.halves:
-                for row in results(args.wheel, half, seed, Path(name)):
-                    with args.results.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(row) + "\n")
+    runs = [views_without_observers([scene]) for path in args.openacc for scene in run_scenes(path)]
+    for seed in args.seeds:
+        for half in args.halves:
+            for row in results(args.wheel, half, seed, args.homes, runs):
+                with args.results.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
     rows = [json.loads(line) for line in args.results.read_text(encoding="utf-8").splitlines()]
-    last = {(row["half"], row["seed"]) for row in rows if (row["home"], row["detector"]) == ("real", LEARNERS[-1])}
-    rows = [row for row in rows if (row["half"], row["seed"]) in last]  # others are not complete
-    print(f"{len(last)} of home half and seed: {sorted(last)}")
+    rows.sort(key=lambda row: [*HOMES[:2], "unsmoothed", HOMES[2]].index(row["home"]))
+    done = sorted({(row["half"], row["seed"]) for row in rows})
+    print(f"{len(done)} of home half and seed: {done}")
     for goal, marker in (("20/h", "rate"), ("95%", "share"), ("p = 0.5", "half")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
+    show(told_lines(rows), args.write, "transfer-told")
+    if runs:
+        show(run_lines(rows), args.write, "transfer-runs")
 
 
 if __name__ == "__main__":

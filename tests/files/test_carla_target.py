@@ -140,7 +140,7 @@ def test_the_control_follows_what_is_written_to_2_cm_through_a_stop(tmp_path: Pa
 
 def test_what_it_does_not_know_is_named(tmp_path: Path) -> None:
     found, _ = written(tree(tmp_path, **SCENARIOS["kept actions"]), None, "carla")
-    named = " ".join(found.notes)
+    named = " ".join(map(str, found.notes))
     for word in ("VisibilityAction", "CustomCommandAction", "TrafficSignalStateAction", "AppearanceAction"):
         assert word in named
     assert named.count("TrafficSignalStateAction left out") == 1

@@ -8,6 +8,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.references import (
     broken_constraint,
@@ -19,7 +20,6 @@ from xosc_lateral.files.openscenario.references import (
 )
 from xosc_lateral.world.scenario.enums import ParameterType
 from xosc_lateral.world.scenario.parameters import Scope
-from xosc_lateral.world.scenario.place import Unsupported
 
 
 def element(content: str, scope: Scope | None = None) -> XmlElement:
@@ -148,12 +148,12 @@ def test_without_a_constraint_nothing_is_broken() -> None:
 
 def test_a_declared_value_beyond_its_constraints_plays_and_is_remarked_an_override_is_refused() -> None:
     root = element(declared(("v", "double", "80"), constraints=WITHIN))
-    remarks: list[Unsupported] = []
-    _, parameters = read_declarations(root, {}, remarks)
+    notes: list[Note] = []
+    _, parameters = read_declarations(root, {}, notes)
     assert parameters["v"].value == "80"
-    assert [remark.reason for remark in remarks] == ["'80' violates greaterThan 0 and lessOrEqual 50"]
+    assert [note.what for note in notes] == ["'80' violates greaterThan 0 and lessOrEqual 50"]
     with pytest.raises(FormatError, match="value '90' violates greaterThan 0 and lessOrEqual 50"):
         read_declarations(root, {"v": "90"}, [])
-    remarks.clear()
-    read_declarations(root, {"v": "40"}, remarks)
-    assert remarks == []
+    notes.clear()
+    read_declarations(root, {"v": "40"}, notes)
+    assert notes == []

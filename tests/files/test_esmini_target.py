@@ -29,7 +29,7 @@ def test_what_would_stop_it_is_left_out_and_named(tmp_path: Path) -> None:
     assert written(source, None)[1].findall(".//RandomRouteAction")
     found, root = written(source, None, "esmini")
     assert not root.findall(".//RandomRouteAction")
-    assert [note for note in found.notes if "RandomRouteAction left out (esmini would stop there)" in note]
+    assert [note for note in found.notes if "RandomRouteAction left out (esmini would stop there)" in note.what]
 
 
 def test_without_such_things_it_is_what_anybody_gets(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_a_missing_file_is_named(tmp_path):
 
 def test_what_is_odd_but_clear_is_repaired_and_noted_with_its_line():
     network = read_opendrive(DATA / "valid" / "odd.xodr")
-    notes = [note.split("odd.xodr:")[1] for note in network.notes]
+    notes = [str(note).split("odd.xodr:")[1] for note in network.notes]
     assert "10: geometry of length 0 m left out" in notes
     assert "6: length=250 m, but the geometry ends at 200 m: 200 m used" in notes
     assert "18: lane -2 has neither width nor border: taken as 0 m wide" in notes
@@ -79,7 +79,7 @@ def test_the_same_note_is_counted_and_not_repeated(tmp_path):
     path = tmp_path / "road.xodr"
     path.write_text(text.replace("<planView>", "<planView>" + 3 * zero))
     (note,) = read_opendrive(path).notes
-    assert note.endswith("geometry of length 0 m left out (and 2 more)")
+    assert note.what.endswith("geometry of length 0 m left out (and 2 more)")
 
 
 def test_attributes_of_road_links_and_junctions_are_kept():
@@ -118,7 +118,7 @@ def test_every_public_road_is_read(shared):
         network = read_opendrive(path)
         assert network.roads
         for note in network.notes:
-            assert "0 m wide" in note, note
+            assert "0 m wide" in note.what, note
 
 
 def _damage(root: etree._Element, rng: random.Random) -> None:
@@ -204,4 +204,4 @@ def test_of_two_lane_layers_the_permanent_one_counts(tmp_path, order):
     assert network.travel_direction(0, -1) == 1
     for s in (10.0, 30.0, 50.0, 90.0):
         assert network.lane_state_at(0, -1, s)[::2] == pytest.approx((-1.75, 3.5))
-    assert any("temporary lanes are left out" in note for note in network.notes)
+    assert any("temporary lanes are left out" in note.what for note in network.notes)

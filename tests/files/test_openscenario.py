@@ -133,8 +133,8 @@ def test_constraint_groups_refuse_overrides_and_only_remark_defaults(tmp_path: P
     constraint = '<ConstraintGroup><ValueConstraint rule="lessThan" value="60"/></ConstraintGroup>'
     text = scenario_text(parameters=declarations(parameter("Speed", "70", constraints=constraint)))
     path = write_scenario(tmp_path, text)
-    assert [remark.kind for remark in read_scenario(path).remarks] == ["ConstraintGroup"]
-    assert read_scenario(path, {"Speed": "59"}).remarks == ()
+    assert [note.element for note in read_scenario(path).notes] == ["ParameterDeclaration 'Speed'"]
+    assert read_scenario(path, {"Speed": "59"}).notes == ()
     with pytest.raises(FormatError, match="'61' violates lessThan 60"):
         read_scenario(path, {"Speed": "61"})
 
@@ -144,7 +144,7 @@ def test_one_satisfied_constraint_group_suffices(tmp_path: Path) -> None:
         f'<ConstraintGroup><ValueConstraint rule="equalTo" value="{v}"/></ConstraintGroup>' for v in ("-1", "1")
     )
     path = write_scenario(tmp_path, scenario_text(parameters=declarations(parameter("Lane", "1", "int", groups))))
-    assert read_scenario(path, {"Lane": "-1"}).remarks == ()
+    assert read_scenario(path, {"Lane": "-1"}).notes == ()
     with pytest.raises(FormatError, match="equalTo -1 or equalTo 1"):
         read_scenario(path, {"Lane": "2"})
 
@@ -191,7 +191,7 @@ def test_a_missing_controller_catalog_is_remarked_not_refused(tmp_path: Path) ->
     controller = f"<ObjectController>{reference('pilot', catalog_name='Pilots')}</ObjectController>"
     scenario = made(tmp_path, entities=entity("Ego", controller=controller))
     assert [found.name for found in scenario.entity("Ego").controllers] == ["pilot"]
-    assert [remark.kind for remark in scenario.remarks] == ["CatalogReference"]
+    assert [note.element for note in scenario.notes] == ["CatalogReference of ScenarioObject 'Ego'"]
 
 
 def test_entity_selections_are_replaced_by_their_members(tmp_path: Path) -> None:
@@ -301,7 +301,7 @@ def test_a_link_out_of_the_folders_is_refused(tmp_path: Path) -> None:
 def test_a_stale_road_path_falls_back_to_the_name_beside_the_scenario_with_a_remark(tmp_path: Path) -> None:
     scenario = made(tmp_path, road="c:/somebody/else/road.xodr")
     assert scenario.road_file == tmp_path / "road.xodr"
-    assert [remark.kind for remark in scenario.remarks] == ["LogicFile"]
+    assert [note.element for note in scenario.notes] == ["LogicFile"]
 
 
 def test_a_forged_provenance_opens_no_file_elsewhere(tmp_path: Path) -> None:
@@ -354,7 +354,7 @@ def test_a_changed_file_is_read_anew(tmp_path: Path) -> None:
 def test_later_versions_are_read_as_the_newest_known(tmp_path: Path) -> None:
     scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=7, stop=time_condition(3))))
     assert scenario.header.version == (1, 7)
-    assert [remark.kind for remark in scenario.remarks] == ["FileHeader"]
+    assert [note.element for note in scenario.notes] == ["OpenSCENARIO"]
 
 
 TRAJECTORY = (
@@ -402,9 +402,7 @@ def test_a_trailer_is_named_as_the_standard_does_or_as_before_it(tmp_path: Path,
     hitched = vehicle().replace("</Vehicle>", f'<Trailer><{tag} entityRef="Box"/></Trailer></Vehicle>')
     scenario = made(tmp_path, entities=entity("Ego", hitched) + entity("Box", vehicle()))
     assert scenario.entity("Ego").trailer == (None if said else "Box")
-    assert [remark.reason for remark in scenario.remarks] == [
-        f"a trailer of '{name}' by a {tag} is not read" for name in said
-    ]
+    assert [note.what for note in scenario.notes] == [f"a trailer of '{name}' by a {tag} is not read" for name in said]
 
 
 @pytest.mark.parametrize("folder", ["", "/nobody/has/this/folder"])
@@ -414,7 +412,7 @@ def test_a_missing_vehicle_catalog_costs_a_remark_and_a_usual_car(tmp_path: Path
         parts["catalogs"] = locations(folder, "VehicleCatalog")
     scenario = made(tmp_path, **parts)
     assert scenario.entity("Ego").bounding_box.length == 5.0
-    assert "'Ego' is played as a car of usual size" in scenario.remarks[0].reason
+    assert "'Ego' is played as a car of usual size" in scenario.notes[0].what
     with pytest.raises(FormatError, match="catalog 'Cars' not found"):
         read_scenario(scenario.path, strict=True)
 
@@ -430,7 +428,7 @@ def test_what_field_files_leave_out_is_taken_as_meant_and_said(tmp_path: Path) -
     path = write_scenario(tmp_path, "<!-- before the declaration -->\n" + text)
     scenario = read_scenario(path)
     assert (scenario.header.minor, scenario.entities[0].vehicle_category) == (1, VehicleCategory.CAR)
-    said = "; ".join(remark.reason for remark in scenario.remarks)
+    said = "; ".join(note.what for note in scenario.notes)
     assert "taken as a car" in said and "contains no action" in said
 
 
@@ -441,5 +439,5 @@ def test_a_truth_value_in_capitals_is_remarked_once_for_each_word(tmp_path):
         '<EntityCondition><TimeHeadwayCondition entityRef="Ego" value="1" freespace="True" rule="lessThan"/>'
         "</EntityCondition></ByEntityCondition></Condition></ConditionGroup>"
     )
-    (remark,) = [remark for remark in made(tmp_path, stop=2 * condition).remarks if "freespace" in remark.reason]
-    assert "freespace='True' is read as true (2 times)" in remark.reason
+    (note,) = [note for note in made(tmp_path, stop=2 * condition).notes if "freespace" in note.what]
+    assert "freespace='True' is read as true (2 times)" in note.what

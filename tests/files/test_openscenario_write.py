@@ -271,9 +271,10 @@ def test_controllers_of_converted_entities_go_and_are_named(tmp_path: Path) -> N
     assert again.entity("Ego").controllers == ()
     assert [found.name for found in again.entity("B").controllers] == ["pilot"]
     assert "ActivateControllerAction" not in (tmp_path / "out.xosc").read_text()
-    (removed,) = written.removed
-    assert removed.reason == (
-        "'Ego' follows a trajectory: controller 'pilot': along and across the road; now as the default driver would"
+    (left_out,) = written.notes
+    assert left_out.what == (
+        "ObjectController left out ('Ego' follows a trajectory: "
+        "controller 'pilot': along and across the road; now as the default driver would)"
     )
     assert written.converted == ("Ego",)
 

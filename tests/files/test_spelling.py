@@ -8,13 +8,13 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.files.openscenario.element import XmlElement
-from xosc_lateral.files.openscenario.read import BOOLEANS, remark_spellings
+from xosc_lateral.files.openscenario.read import BOOLEANS, note_spellings
 from xosc_lateral.world.scenario.parameters import Scope
 
 
 def remarks(text: str) -> list[str]:
     root = XmlElement(etree.fromstring(f"<OpenSCENARIO>\n{text}\n</OpenSCENARIO>"), Path("made.xosc"), Scope({}))
-    return [f"{remark.place.line}: {remark.kind}: {remark.reason}" for remark in remark_spellings(root)]
+    return [f"{note.line}: {note.element}: {note.what}" for note in note_spellings(root)]
 
 
 @pytest.mark.parametrize("word", ["True", "TRUE", " True "])

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from tests.kit.motion import drive, entity, together, two_roads
+from xosc_lateral.base.note import Note
+from xosc_lateral.base.note import warnings as as_warnings
 from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EntityResult, SampledSegment
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.gaps import Gap, smallest_gaps
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Note
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import cut_segments
 from xosc_lateral.world.motion.trajectory import displace
 from xosc_lateral.world.road.network import RoadNetwork
@@ -93,4 +95,4 @@ def converted(enriched: Enriched, *warnings: str) -> Conversion:
     made = ConversionProvenance(
         "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
     )
-    return Conversion(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, warnings)
+    return Conversion(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, as_warnings(warnings))

@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Tables, Written, command, warn, write_stdout
+from xosc_lateral.cli.words import Options, Strict, Tables, Written, command, refuse_warnings, warn, write_stdout
 
 # What is said of one option stays together.
 # fmt: off
@@ -50,6 +50,7 @@ def fit(
     output: Annotated[str, typer.Option("--output", "-o", metavar="PROFILE.json",
         help="Profile to write: file, folder/, or -.")],
     options: Annotated[Options, xl.fit],
+    strict: Strict = False,
     reply: Written,
 ) -> None:
     """Fit a driver profile to measured drives."""
@@ -68,7 +69,10 @@ def fit(
         xl.write_profile(profile, written, force=reply.force)
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
-    warn([*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))])
+    warned = [*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))]
+    warn(warned)
+    if strict and warned:
+        raise typer.Exit(1)
 
 
 @command(
@@ -81,6 +85,7 @@ def sample(
     output: Annotated[str, typer.Option("--output", "-o", metavar="OUT",
         help="Table: .csv, .csv.gz, .parquet, folder/, - .")],
     options: Annotated[Options, xl.sample],
+    strict: Strict = False,
     reply: Written,
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
@@ -95,6 +100,7 @@ def sample(
         written = made.write(output, force=reply.force)
         reply.say_words(f"{made.headline()} in {written}", {"output": str(written), **made.to_dict()})
     warn(made.warnings)
+    refuse_warnings(made, strict)
 
 
 @command(app, "evaluate", VERBS["evaluate"], "evaluate drives.csv.gz -p mine.json --report evaluation.html")

@@ -12,7 +12,19 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Force, Options, Osi, Quiet, Verbose, Written, command, say, warn
+from xosc_lateral.cli.words import (
+    Force,
+    Options,
+    Osi,
+    Quiet,
+    Strict,
+    Verbose,
+    Written,
+    command,
+    refuse_warnings,
+    say,
+    warn,
+)
 from xosc_lateral.workflows.options import Paths
 
 if TYPE_CHECKING:
@@ -36,6 +48,7 @@ class Outputs:
     states: Annotated[str | None, typer.Option("--states", metavar="OUT",
         help="Table of where everybody was: .csv, .csv.gz, .parquet.")] = None
     osi: Osi = None
+    strict: Strict = False
 
     def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
@@ -52,6 +65,7 @@ class Outputs:
                 run.write_osi(trace, force=reply.force)
         warn(run.warnings)
         reply.say(run)
+        refuse_warnings(run, self.strict)
 
 
 @command(

@@ -22,6 +22,7 @@ from xosc_lateral.cli.words import (
     command,
     naming_option,
     pairs,
+    refuse_warnings,
     say,
     say_json,
     warn,
@@ -80,10 +81,7 @@ def states(
         for note in played.notes:
             say(note, err=True)
     warn(played.warnings)
-    if options["strict"] and reply.quiet:
-        warn(played.doubts)
-    if options["strict"] and (played.warnings or played.doubts):
-        raise typer.Exit(1)
+    refuse_warnings(played, options["strict"])
 
 
 @command(app, "segments", VERBS["segments"], "segments cut-in.xosc", "segments cut-in.xosc --json")
@@ -93,8 +91,10 @@ def segments(
     """List each entity's road-following segments, and the reason for everything else."""
     played = _played(scenario, options)
     listed = xl.segments(played)
-    warn(played.warnings)
     reply.say(listed)
+    if reply.as_json or reply.quiet:
+        warn(listed.warnings)
+    refuse_warnings(listed, options["strict"])
 
 
 @command(
@@ -146,6 +146,7 @@ def view(
                 write(True)
             except xl.XoscLateralError as error:  # a file that is being edited may be broken for a while
                 say(error, err=True)
+    refuse_warnings(played, options.get("strict", False))
 
 
 group = typer.Typer(help="Maneuver-based motorway scenarios to start from.", no_args_is_help=True)

@@ -15,6 +15,7 @@ import typer
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
+from xosc_lateral.base.note import Telling
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on 
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Osi = Annotated[str | None, typer.Option("--osi", metavar="TRACE",
     help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Exit with 1 on warnings.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
 Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
 Columns = Annotated[list[str] | None, typer.Option("--map", metavar="NAME=COLUMN[:UNIT]",
@@ -122,6 +124,12 @@ class Mapped:
         from xosc_lateral.files.mapping import as_mapping
 
         return as_mapping(self.mapping_file).with_words(pairs(self.columns, "--map"))
+
+
+def refuse_warnings(result: Telling, strict: bool) -> None:
+    """End with exit code 1 where something was warned of, and nothing may be."""
+    if strict and result.warnings:
+        raise typer.Exit(1)
 
 
 @dataclass(frozen=True, slots=True)

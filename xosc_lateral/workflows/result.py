@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.note import Note, Telling, rows_left_out
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.options import paths as as_paths
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from xosc_lateral.files.mapping import MappingLike
 
 
-class Result(ABC):
+class Result(Telling, ABC):
     """A result: a line as its `repr`, the command line's text as its `str`, a table, and JSON values."""
 
     __slots__ = ()
@@ -114,6 +115,11 @@ class GivenDrives:
     inputs: Mapping[str, str]
     files: tuple[Path, ...]
     left_out: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """Rows that are left out."""
+        return rows_left_out(self.left_out)
 
     def valid_below(self, frequency: float | None) -> GivenDrives:
         """The same, where drives that don't state their band show driving below a frequency [Hz]."""

@@ -172,12 +172,12 @@ def test_a_context_that_nobody_supplies_is_named_and_a_given_one_is_used(tmp_pat
     motion = together(drive(network, entity()))
     unknown = enrich(SegmentedRun(motion, network), {"car": driver}, seed=1)
     assert unknown.entity("car").neutral == ("wind_speed",)
-    assert any("wind_speed" in warning for warning in unknown.warnings())
+    assert any("wind_speed" in warning.what for warning in unknown.warnings())
     wind = (np.array([0.0, 10.0]), np.array([0.2, 0.2]))
     given = enrich(SegmentedRun(motion, network), {"car": driver}, seed=1, context={"wind_speed": wind})
     difference = given.entity("car").segments[0].offset - unknown.entity("car").segments[0].offset
     np.testing.assert_allclose(difference, 0.2)
-    assert not given.warnings()
+    assert not list(given.warnings())
 
 
 def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     )
     assert [departure.name for departure in result.departures] == ["a"]
     assert [gap.names for gap in result.new_contacts] == [("a", "b")]
-    assert len(result.warnings()) == 2
+    assert len(list(result.warnings())) == 2
     again = enrich(
         SegmentedRun(motion, network, neighbours=PROFILE), {"a": driver}, seed=1, context={"push": far_left}, attempts=3
     )
@@ -199,7 +199,7 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     assert not jointly.new_contacts, "a car that is there is given way to"
     calm = enrich(SegmentedRun(motion, network), {"a": simulated_profile()}, seed=1, attempts=3)
     assert calm.attempt == 0
-    assert not calm.warnings()
+    assert not list(calm.warnings())
 
 
 def test_who_is_not_enriched_keeps_every_bit_and_the_reason_is_given(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests.kit.enriched import converted, made_enriched
+from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.playing import figures as figures
 from xosc_lateral.world.motion.gaps import Gap
-from xosc_lateral.world.motion.nominal import Note
 
 
 @pytest.fixture(scope="module")

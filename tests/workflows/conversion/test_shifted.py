@@ -44,7 +44,7 @@ def test_an_event_that_is_missing_is_named(tmp_path: Path) -> None:
         return Stage(tmp_path).play(maneuvers(first, then), last=8.0)
 
     (change,) = _compare(run("completeState"), run("skipTransition")).changes
-    assert str(change) == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
+    assert str(change.note) == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
 
 
 def _path(entity: str, after: tuple[str, ...] | None) -> OffsetPath:
@@ -73,7 +73,7 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
     assert kept.changes == ()
     assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (0.25, False)}
-    assert "offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(()))
+    assert "offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(())).what
 
 
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:

@@ -157,4 +157,5 @@ def test_a_program_is_told_places_sizes_and_the_ego(tmp_path, monkeypatch):
         {key: row[name] for key, name in same.items()}, abs=1e-3
     )
     assert (vehicle["road"], vehicle["lane"]) == (str(row["road"]), row["lane"])
-    assert {"length", "width", "center_x", "lane_width", "offset", "lateral_speed"} <= vehicle.keys()
+    known = {"length", "width", "center_x", "lane_width", "offset", "lateral_speed"}
+    assert all(known <= one.keys() for line in told for one in line["vehicles"].values())  # of the ego, too

@@ -18,8 +18,8 @@ from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, views_of
 from xosc_lateral.workflows.detection.page import clip_scene
 from xosc_lateral.workflows.detection.scoring import Case
-from xosc_lateral.workflows.detection.sources import played_scene
-from xosc_lateral.workflows.detection.tracks import STEP
+from xosc_lateral.workflows.detection.sources import SourceSettings, played_scene, sources_of
+from xosc_lateral.workflows.detection.tracks import STEP, truth_of
 
 
 @pytest.fixture
@@ -129,6 +129,25 @@ def test_a_folder_is_read_without_its_catalogs_and_trains_what_another_source_te
     result = xl.detect("many", detectors="logistic:threshold=0.9", train="cut-in.xosc", ego="none")
     found = row(result, "many", "logistic")
     assert found["cut_ins"] == 3 and found["threshold"] == 0.9 and found["seen"] == 1.0
+
+
+SETS = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T00:00:00" description="" author=""/>
+<ParameterValueDistribution><ScenarioFile filepath="cut-in.xosc"/><Deterministic>
+<DeterministicSingleParameterDistribution parameterName="lane_change_time"><DistributionSet>
+<Element value="4"/><Element value="8"/></DistributionSet></DeterministicSingleParameterDistribution>
+</Deterministic></ParameterValueDistribution></OpenSCENARIO>"""
+
+
+def test_a_distribution_stands_for_its_scenarios_each_with_offsets_of_its_own(tmp_path):
+    xl.write_template("cut-in", tmp_path)
+    (tmp_path / "sets.xosc").write_text(SETS)
+    settings = SourceSettings(variants=1, profiles=("motorway",), ego="none")
+    written, lifelike = (list(source.scenes()) for source in sources_of(tmp_path, settings))
+    assert [scene.name for scene in written] == ["sets_p00000", "sets_p00001"]  # the scenario alone is none of them
+    lasts = [truth_of(track).changes[0] for scene in written for track in scene.tracks if track.name == "CutIn"]
+    assert [round((one.crossing - one.begin) * STEP) for one in lasts] == [1, 2]
+    before = [next(track for track in scene.tracks if track.name == "Truck").offset[:200] for scene in lifelike]
+    assert np.abs(before[0] - before[1]).max() > 0.01
 
 
 @pytest.mark.parametrize(

@@ -98,6 +98,9 @@ def test_rows_like_the_scenarios_weigh_most(found: Maneuvers) -> None:
     weights = found.weights(left=True, speed=30.0, lane_width=3.5)
     assert np.isclose(weights.sum(), 1.0)
     assert not weights[~np.array(found.left)].any()
+    near, none = (found.weights(left=True, speed=30.0, lane_width=3.5, gap=gap) for gap in (30.0, np.nan))
+    assert (near * found.column("gap")).sum() < (weights * found.column("gap")).sum()
+    assert np.allclose(none, weights)  # all of these have somebody ahead
     far = found.weights(left=True, speed=300.0, lane_width=3.5)  # nobody drove so fast: the fastest stand for him
     assert found.column("speed")[far.argmax()] == found.column("speed")[np.array(found.left)].max()
 
@@ -145,6 +148,35 @@ def test_a_lane_change_without_a_parameter_gets_one(profile: Path, tmp_path: Pat
     assert abs(lasts[0] - lasts[1] - (values[0] - 4.0)) < 0.3
     unchanged = xl.play(made.scenario).to_frame()
     pd.testing.assert_frame_equal(unchanged, plain.to_frame())  # the default is what was written
+
+
+def test_speeds_change_beside_lane_changes_where_the_vehicle_keeps_its_own(profile: Path, tmp_path: Path) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path / "first")
+    made = xl.vary(scenario, tmp_path / "varied", like=profile, count=2, speeds=True)
+    ((name, changes),) = made.speed_changes.items()
+    etree.XMLSchema(etree.parse(str(XSD))).assertValid(etree.parse(str(made.scenario)))
+    (duration,) = made.durations
+    speeds = []
+    for change in (0.0, 2.0):
+        rows = xl.play(made.scenario, parameters={duration: 6.0, name: change}).to_frame().query("name == 'CutIn'")
+        begin = rows["time"][rows["offset_t"].abs() > 1e-3].iloc[0]
+        speeds.append(np.interp(begin + np.array([0.0, 5.9]), rows["time"], rows["speed"]))
+    assert speeds[0] == pytest.approx([35.0, 35.0], abs=1e-6)
+    assert speeds[1] == pytest.approx([35.0, 37.0], abs=0.02)
+    assert {float(one[name]) for one in read_distribution(made.distribution).distribution.parts[0].sets} == set(changes)
+
+
+def test_a_vehicle_ahead_is_found_in_lanes_that_run_against_the_road(tmp_path: Path) -> None:
+    road = two_lanes_each_way(tmp_path)
+    rows = [changing(k, one, left=k % 2 > 0, ahead=90.0) for k, one in enumerate(DURATIONS)]
+    turned = pd.concat(rows)  # half a turn about a place on the reference line: the other carriageway
+    x, y = world(np.array([700.0]), np.array([0.0]))
+    turned["x"], turned["y"], turned["psi"] = 2 * x[0] - turned["x"], 2 * y[0] - turned["y"], turned["psi"] + np.pi
+    turned.to_csv(tmp_path / "tracks.csv", index=False)
+    found = read_maneuvers(tmp_path / "tracks.csv", road)
+    assert found.changes == len(DURATIONS)
+    assert abs(np.nanmedian(found.column("gap")) - 50.0) < 3.0 and not np.isnan(found.column("gap")).any()
+    assert abs(np.median(found.column("closing_speed")) - 2.0) < 0.3
 
 
 def test_what_cannot_be_varied_is_refused_in_a_line(profile: Path, tmp_path: Path, capsys) -> None:

@@ -11,7 +11,7 @@ from scipy.stats import beta
 import xosc_lateral as xl
 from tests.kit.scenario_files import entity, private, scenario_text, speed_action, teleport, write_scenario
 from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
-from tests.world.scenario.test_under_test import at, event, headway, stories
+from tests.world.scenario.test_under_test import at, event, stories
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import EntityResult, LaneChanges
@@ -97,13 +97,6 @@ def test_a_step_is_refused_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"made\.xosc:\d+: LaneChangeAction of .*: a step has no way across"):
         xl.convert(path, lane_changes="lifelike")
     assert xl.convert(path).modes["A"] == "trajectory"
-
-
-def test_a_vehicle_that_keeps_its_actions_changes_lanes_as_written_and_that_is_said(tmp_path: Path) -> None:
-    path = scenario(tmp_path, trigger=headway("Ego", "A").replace('value="1"', 'value="1.2"'))
-    made = xl.convert(path, seed=2, lane_changes="lifelike")
-    assert made.modes == {"A": "lane-offset"}
-    assert [line for line in made.warnings if "lane changes of 'A' stay as written: it keeps its actions" in line]
 
 
 def test_it_may_be_configured_and_said_in_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,7 +54,7 @@ def test_the_cases_of_the_field(
 
 def test_a_place_beyond_its_route_is_a_doubt_and_so_is_the_car_in_another(shared: Path) -> None:
     played = xl.play(shared / "cases" / "field" / "route_position_past_the_end" / "scenario.xosc")
-    beyond, overlap = played.doubts
+    beyond, overlap = played.warnings
     assert "pathS = 200 m" in beyond and "60.0 m" in beyond and "s = 80 m" in beyond
     assert "'B' appears in 'A'" in overlap
 

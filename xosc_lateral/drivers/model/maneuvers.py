@@ -53,16 +53,20 @@ class Maneuvers(Record, frozen=True):
         """Of the sample, shape (n,); see `COLUMNS`."""
         return np.array([np.nan if value is None else value for value in self.sample[name]])
 
-    def weights(self, *, left: bool, speed: float, lane_width: float) -> FloatArray:
+    def weights(self, *, left: bool, speed: float, lane_width: float, gap: float = np.nan) -> FloatArray:
         """Of the sample's rows for a lane change to a side, at a speed [m/s], in a lane [m]; shape (n,), sum 1. [-]
 
         The nearest weigh most, on the scale of the sample's own deviations; where it has none to that side, all do.
+        `gap`: to the vehicle ahead [m], NaN: there is none; rows with and without one are a deviation apart.
         """
         sides = np.array(self.left) == left
         distance = np.zeros(len(sides))
-        for name, value in (("speed", speed), ("lane_width", lane_width)):
-            known = self.column(name)
-            distance += ((known - value) / max(float(known.std()), 1e-6)) ** 2
+        for name, value in (("speed", speed), ("lane_width", lane_width), ("gap", float(np.log(max(gap, 0.1))))):
+            known = np.log(self.column(name)) if name == "gap" else self.column(name)  # nearness is a ratio
+            there = np.isfinite(known)
+            scale = max(float(known[there].std()), 1e-6) if there.any() else 1.0
+            apart = np.where(there & np.isfinite(value), (known - value) / scale, there != np.isfinite(value))
+            distance += apart**2
         allowed = sides if sides.any() else ~sides
         weights = np.where(allowed, np.exp(-0.5 * (distance - distance[allowed].min())), 0.0)
         return np.asarray(weights / weights.sum())

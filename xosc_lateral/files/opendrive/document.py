@@ -10,6 +10,7 @@ from math import isfinite
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.xml import line_of
 from xosc_lateral.world.road.piecewise import Cubic
 
@@ -34,10 +35,10 @@ class RoadFile:
         self._first_line.setdefault(what, line_of(element) or 0)
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """One line per kind of note, with the line of its first occurrence."""
+    def notes(self) -> tuple[Note, ...]:
+        """One per kind of note, with the line of its first occurrence."""
         return tuple(
-            f"{self.path}:{self._first_line[what]}: {what}" + (f" (and {count - 1} more)" if count > 1 else "")
+            Note(what + (f" (and {count - 1} more)" if count > 1 else ""), self.path, self._first_line[what])
             for what, count in self._notes.items()
         )
 

@@ -12,9 +12,10 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_typ
 from msgspec import NODEFAULT, UNSET, Struct, structs
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.openscenario.references import Catalogs, local_scope, parameter_name
-from xosc_lateral.world.scenario.place import Place, Unsupported, Xml
+from xosc_lateral.world.scenario.place import Place, Xml
 from xosc_lateral.world.scenario.position import Position, Shape
 
 S = TypeVar("S", bound=Struct)
@@ -33,7 +34,7 @@ class Context:
 
     version: tuple[int, int]  # (major, minor) of the file
     catalogs: Catalogs
-    remarks: list[Unsupported]  # collected on the way
+    notes: list[Note]  # collected on the way
     readers: Mapping[object, Reader]
     """Own readers, of an element and this context, for what the declaration of a struct does not say."""
     entities: set[str] = field(default_factory=set)  # names of scenario objects; filled before the storyboard is read
@@ -56,9 +57,9 @@ class Context:
             selected = self.selections.get(element.text("entityRef"))
             yield from (self.entity(element),) if selected is None else selected
 
-    def remark(self, element: XmlElement, reason: str = "") -> None:
+    def note(self, element: XmlElement, reason: str = "is not read") -> None:
         """Note something that is read over."""
-        self.remarks.append(Unsupported(element.tag, element.place(), reason))
+        self.notes.append(element.place().note(reason))
 
     def inline_or_entry(self, owner: XmlElement, tag: str) -> XmlElement:
         """The element of that tag that `owner` holds or refers to, in the scope of its own and assigned parameters."""
@@ -75,7 +76,7 @@ class Context:
         try:
             return self.catalogs.entry(reference)
         except FormatError as error:
-            self.remark(reference, error.what)
+            self.note(reference, error.what)
             return None
 
     def nested(self, element: XmlElement, reader: Callable[[XmlElement, Context], R]) -> R:

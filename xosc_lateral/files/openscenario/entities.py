@@ -47,7 +47,7 @@ def read_date_time(element: XmlElement) -> datetime | None:
 def _time_of_day(element: XmlElement, context: Context) -> TimeOfDay | None:
     moment = read_date_time(element)
     if moment is None:
-        context.remark(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
+        context.note(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
         return None
     return TimeOfDay(moment, element.value("animation", bool, False))
 
@@ -132,7 +132,7 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
     try:
         vehicle_category = vehicle_category and content.value("vehicleCategory", VehicleCategory, vehicle_category)
     except FormatError as error:
-        context.remark(content, f"{error.what}: taken as a car")
+        context.note(content, f"{error.what}: taken as a car")
     entity = read_struct(
         Entity,
         content,
@@ -156,7 +156,7 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
 
 def _stand_in(reference: XmlElement, name: str, context: Context, error: MissingFileError) -> Entity:
     """A car like others, for one whose catalog is missing."""
-    context.remark(reference, f"{error.what}: '{name}' is played as a car of usual size without limits")
+    context.note(reference, f"{error.what}: '{name}' is played as a car of usual size without limits")
     return Entity(
         name=name,
         category=EntityCategory.VEHICLE,
@@ -180,7 +180,7 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
         return None, []
     for other in owner.children():
         if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
-            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
+            context.note(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
     reference = owner.child("TrailerRef", "EntityRef")
     inner = owner.child("Trailer")
     if reference is not None:
@@ -211,7 +211,7 @@ def _read_performance(element: XmlElement, context: Context) -> Performance:
     usual = {"maxSpeed": inf, "maxAcceleration": USUAL_ACCELERATION, "maxDeceleration": USUAL_ACCELERATION}
     for name in ("maxAcceleration", "maxDeceleration"):
         if element.optional_text(name) is None:
-            context.remark(element, f"{name} is missing: {USUAL_ACCELERATION:g} m/s2 is taken")
+            context.note(element, f"{name} is missing: {USUAL_ACCELERATION:g} m/s2 is taken")
     usual |= {"maxAccelerationRate": inf, "maxDecelerationRate": inf}
     limits = {name: element.number(name, limit, finite=False) for name, limit in usual.items()}
     for name, limit in limits.items():

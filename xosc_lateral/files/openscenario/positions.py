@@ -51,7 +51,7 @@ def _relative_lane(e: XmlElement, context: Context) -> places.RelativeLanePositi
     if ds is None and e.optional_number("dsLane") is None:
         ds = _number_or_zero(e, "ds", context)
     if lanes is None:
-        context.remark(e, "dLane is missing: taken as 0, the same lane")
+        context.note(e, "dLane is missing: taken as 0, the same lane")
     return read_struct(places.RelativeLanePosition, e, context, d_lane=lanes or 0, ds=ds)
 
 
@@ -64,7 +64,7 @@ def _number_or_zero(e: XmlElement, name: str, context: Context) -> float:
     """A way from the reference entity; where the file has none it is 0, which is said. [m]"""
     value = e.optional_number(name)
     if value is None:
-        context.remark(e, f"{name} is missing: taken as 0 m")
+        context.note(e, f"{name} is missing: taken as 0 m")
     return value or 0.0
 
 
@@ -74,7 +74,7 @@ def _route(e: XmlElement, context: Context) -> places.RoutePosition:
     content = owner.child() if owner is not None else None
     reader = None if content is None else _IN_ROUTE.get(content.tag)
     if content is not None and reader is None:
-        context.remark(content)
+        context.note(content)
     place = None if content is None or reader is None else reader(content, context)
     return read_struct(places.RoutePosition, e, context, route=route, in_route=place)
 

@@ -10,6 +10,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
@@ -19,7 +20,7 @@ from xosc_lateral.files.openscenario.references import Boundary
 from xosc_lateral.files.openscenario.storyboard import READERS
 from xosc_lateral.files.xml import document_of, read_document
 from xosc_lateral.world.scenario.parameters import Scope
-from xosc_lateral.world.scenario.place import Place, Unsupported
+from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.scenario import FileHeader, Scenario, Storyboard, TrafficSignalController
 
 BOOLEANS = frozenset(
@@ -32,7 +33,7 @@ BOOLEANS = frozenset(
 """Attributes that the standard calls Boolean, all versions."""
 
 
-def remark_spellings(root: XmlElement) -> list[Unsupported]:
+def note_spellings(root: XmlElement) -> list[Note]:
     """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
     elements: dict[tuple[str, str], list[etree._Element]] = {}
     for item in root.xml.iter("{*}*"):
@@ -42,13 +43,13 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
             is_boolean = name in BOOLEANS or (declares and name == "value")
             if is_boolean and means_true(word) and word not in ("true", "1"):
                 elements.setdefault((str(name), word), []).append(item)
-    remarks = []
+    notes = []
     for (name, word), items in elements.items():
         place = XmlElement(items[0], root.path, root.scope).place()
         times = "" if len(items) == 1 else f" ({len(items)} times)"
         why = "the standard's word is 'true', and the reference player takes this one for false"
-        remarks.append(Unsupported(place.element, place, f"{name}='{word}' is read as true{times}; {why}"))
-    return remarks
+        notes.append(place.note(f"{name}='{word}' is read as true{times}; {why}"))
+    return notes
 
 
 _NEWER = {
@@ -59,7 +60,7 @@ _NEWER = {
 """Since version 1.4: elements, and an attribute of lanes."""
 
 
-def remark_newer(root: XmlElement) -> list[Unsupported]:
+def note_newer(root: XmlElement) -> list[Note]:
     """One remark for each kind of what version 1.4 has and nobody plays, at its first place."""
     elements: dict[str, etree._Element] = {}
     for item in root.xml.iter("{*}*"):
@@ -69,7 +70,7 @@ def remark_newer(root: XmlElement) -> list[Unsupported]:
         if name in _NEWER and not is_timed:
             elements.setdefault(name, item)
     places = ((name, XmlElement(item, root.path, root.scope).place()) for name, item in elements.items())
-    return [Unsupported(place.element, place, f"{name} {_NEWER[name]}") for name, place in places]
+    return [place.note(f"{name} {_NEWER[name]}") for name, place in places]
 
 
 NEWEST_VERSION = (1, 3)
@@ -120,28 +121,26 @@ def read_scenario(
         root.fail("is a parameter value distribution, not a scenario: read the scenarios that it stands for")
     if root.child("Storyboard") is None and root.child("Catalog") is not None:
         root.fail("is a catalog, not a scenario")
-    remarks: list[Unsupported] = []
+    notes: list[Note] = []
     header = read_header(root)
     if header.version > NEWEST_VERSION:
-        remarks.append(
-            Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}")
-        )
-        remarks.extend(remark_newer(root))
-    remarks.extend(remark_spellings(root))
-    scope, values = references.read_declarations(root, dict(parameters or {}), remarks)
+        notes.append(root.place().note(f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}"))
+        notes.extend(note_newer(root))
+    notes.extend(note_spellings(root))
+    scope, values = references.read_declarations(root, dict(parameters or {}), notes)
     root = root.within(scope)
     boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
     locations = _catalog_locations(root)
-    catalogs = references.Catalogs(locations, boundary, remarks)
-    context = Context(header.version, catalogs, remarks, READERS, strict=strict, left_handed=header.is_left_handed)
+    catalogs = references.Catalogs(locations, boundary, notes)
+    context = Context(header.version, catalogs, notes, READERS, strict=strict, left_handed=header.is_left_handed)
     if header.is_left_handed:
-        remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
+        notes.append(root.place().note(LEFT_HANDED))
     network = root.child("RoadNetwork")
     logic = network.child("LogicFile", "Logics") if network else None
     written = logic.text("filepath", "") if logic else ""
     road_file = roads.file if network else None
     if road_file is None and logic and written.strip():
-        road_file = _road_file(logic, written, boundary, remarks, roads)
+        road_file = _road_file(logic, written, boundary, notes, roads)
     listed_controllers = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
     controllers = tuple(read_struct(TrafficSignalController, each, context) for each in listed_controllers)
     entities = read_entities(root, context)
@@ -156,7 +155,7 @@ def read_scenario(
         traffic_signal_controllers=controllers,
         entities=entities,
         storyboard=storyboard,
-        remarks=tuple(remarks),
+        notes=tuple(notes),
         input_hashes={path: document.sha256, **catalogs.used},
         source=document.data,
     )
@@ -194,9 +193,7 @@ def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
     return locations
 
 
-def _road_file(
-    logic: XmlElement, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
-) -> Path:
+def _road_file(logic: XmlElement, written: str, boundary: Boundary, notes: list[Note], roads: RoadSearch) -> Path:
     """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
     place, name = logic.place(), PureWindowsPath(written.strip()).name
     try:
@@ -215,7 +212,7 @@ def _road_file(
     beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
     for near in (*beside, *roads.folders):
         if name and is_file(near / name):
-            remarks.append(Unsupported("LogicFile", place, f"'{written}' is taken from {near / name}"))
+            notes.append(place.note(f"'{written}' is taken from {near / name}"))
             return near / name
     raise missing
 

@@ -18,12 +18,13 @@ from glob import escape
 from pathlib import Path
 
 from xosc_lateral.base.errors import FormatError, MissingFileError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.held import exists, glob, is_file
 from xosc_lateral.files.openscenario.element import XmlElement
 from xosc_lateral.files.xml import read_document, read_xml
 from xosc_lateral.world.scenario.enums import ParameterType, Rule
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope, satisfies
-from xosc_lateral.world.scenario.place import Place, Unsupported
+from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.scenario import Parameter
 
 LEVELS_UP = 3
@@ -103,7 +104,7 @@ class Catalogs:
     locations: Mapping[str, tuple[str, Place]]
     """``VehicleCatalog`` ... to the folder or file as written, and where."""
     boundary: Boundary  # where references may lead
-    remarks: list[Unsupported]  # gets a line for a catalog that was not where the scenario says
+    notes: list[Note]  # gets a line for a catalog that was not where the scenario says
     used: dict[Path, str] = field(default_factory=dict)  # files that entries were taken from so far, and their SHA-256
     _files: dict[str, Path] = field(default_factory=dict)
 
@@ -154,7 +155,7 @@ class Catalogs:
         patterns = (f"{levels}{escape(catalog)}.xosc" for levels in ("", "*/", "*/*/", "*/*/*/"))
         near = [path for pattern in patterns for path in glob(self.boundary.folder, pattern) if is_file(path)]
         if len(near) == 1 and self.boundary.holds(near[0]):
-            self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near[0]}"))
+            self.notes.append(reference.place().note(f"catalog taken from {near[0]}"))
             return near[0]
         if refused is not None:
             raise refused
@@ -208,7 +209,7 @@ def final(value: str) -> str:
 
 
 def read_declarations(
-    root: XmlElement, overrides: Mapping[str, str], remarks: list[Unsupported]
+    root: XmlElement, overrides: Mapping[str, str], notes: list[Note]
 ) -> tuple[Scope, dict[str, Parameter]]:
     """Global scope and parameters, with overrides in place.
 
@@ -231,7 +232,7 @@ def read_declarations(
         if broken and name in overrides:
             item.fail(f"value '{value}' violates {broken}")
         if broken:
-            remarks.append(Unsupported("ConstraintGroup", item.place(), f"'{value}' violates {broken}"))
+            notes.append(item.place().note(f"'{value}' violates {broken}"))
     return scope, parameters
 
 

@@ -57,7 +57,7 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
         owner.fail(f"parameters that are declared around it: {error}")
     contents = [owner] if owner.tag == "UserDefinedAction" else list(_contents(owner))
     if not contents:
-        context.remark(owner, "contains no action: played as nothing")
+        context.note(owner, "contains no action: played as nothing")
     actions = []
     for element in contents:
         reader = readers.get(element.tag)
@@ -186,7 +186,7 @@ def _read_init(element: XmlElement, context: Context) -> Init:
             actions = [action for item in child.children("PrivateAction") for action in read_actions(item, "", context)]
             privates.append(Private(entity, tuple(actions), child.place()))
         else:
-            context.remark(child)
+            context.note(child)
     return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
 
 

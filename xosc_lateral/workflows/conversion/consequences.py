@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from xosc_lateral.base.arrays import BoolArray
 from xosc_lateral.base.rows import blocks, slices_where
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
-from xosc_lateral.world.motion.segments import SegmentKind
 from xosc_lateral.world.road.network import RoadNetwork
 
 
@@ -49,13 +48,10 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
 
 
-def stay_as_written(enriched: Enriched, continuous: Collection[str]) -> tuple[str, ...]:
-    """Lane changes that stay as written although they are to be lifelike; `continuous`: who moves on through them."""
+def stay_as_written(enriched: Enriched) -> tuple[str, ...]:
+    """Lane changes on trajectories that stay as written although they are to be lifelike."""
     lines = []
     for entity in enriched.entities:
-        spans = (span for span in entity.spans if span.kind is SegmentKind.LATERAL_ACTION)
-        if entity.is_enriched and entity.name not in continuous and any(spans):
-            lines.append(f"lane changes of '{entity.name}' stay as written: it keeps its actions, the player moves it")
         for crossing in entity.crossings if entity.is_enriched else ():
             if crossing.stays:
                 what = "lane change" if crossing.is_lane_change else "lane offset"

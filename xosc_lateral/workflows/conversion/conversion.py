@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
 
 
+_PLACE = ("what", "path", "line", "element")
+
+
 class Conversion(ConvertedScenario, Result):
     """A converted scenario, with what there is to see of it: words, table, figure, traces, page."""
 
@@ -52,10 +55,7 @@ class Conversion(ConvertedScenario, Result):
         lines += [f"  {', '.join(names)} {words}" for words, names in alike.items()]
         if self.provenance.options["with_sensor"]:
             lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
-        lines += [
-            f"  note: {note.what}" for note in self.movement.motion.notes if note not in self.movement.motion.doubts
-        ]
-        lines += [f"  warning: {warning}" for warning in self.warnings]
+        lines += self.message_lines()
         if self.report is not None:
             lines.append(f"report: {self.report}")
         return "\n".join(lines)
@@ -137,8 +137,9 @@ class Conversion(ConvertedScenario, Result):
                 }
                 for one in self.shifts
             ],
-            "notes": [asdict(note) for note in enriched.motion.notes],
+            "notes": [{key: one.to_dict()[key] for key in _PLACE} for one in enriched.motion.notes],
             "warnings": list(self.warnings),
+            "messages": self.message_records(),
             "provenance": asdict(self.provenance) | {"profiles": profiles},
         }
 

@@ -14,13 +14,14 @@ from typing import Unpack
 from msgspec import structs
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
+from xosc_lateral.base.note import warnings
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
-from xosc_lateral.files.held import exists, held_at
+from xosc_lateral.files.held import exists
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.remote import is_url, open_url
+from xosc_lateral.files.remote import leads_from, sent_back
 from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
@@ -83,28 +84,24 @@ def convert(
     if variant < 1:
         raise ValueError(f"variant {variant}, they count from 1")
     inputs = scenario_input(scenario, options.pop("road", None))
-    settings = ConvertSettings.of(**options, road=inputs.road)
-    source, url = inputs.path, output if isinstance(output, str) and is_url(output) else ""
-    output = None if url else output
-    # without an output, file references in the bytes are as from the source's folder
-    target = source if output is None else output_scenario(output, source)
-    page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
-    claim([None if output is None else target, page], [source], force=force)
-    with together():
-        conversion = convert_scenario(
-            source,
-            target,
-            settings,
-            variant_index=variant - 1,
-            report=page,
-            saves=output is not None,
-        )
-        conversion.held = inputs.held
-        if url:
-            with open_url(url, "wb") as file:
-                file.write(conversion.data)
-        if page is not None:
-            conversion.write_report(page, force=force)
+    settings, source = ConvertSettings.of(**options, road=inputs.road), inputs.path
+    with sent_back(output, report) as (written, shown):
+        # without an output, file references in the bytes are as from the source's folder
+        target = source if written is None else output_scenario(written, source)
+        page = None if shown is None else output_file(shown, f"{target.stem}.html", PAGE_SUFFIXES)
+        claim([None if written is None else target, page], [source], force=force)
+        with together():
+            conversion = convert_scenario(
+                source,
+                target,
+                settings,
+                variant_index=variant - 1,
+                report=page,
+                saves=written is not None,
+            )
+            conversion.held = inputs.held
+            if page is not None:
+                conversion.write_report(page, force=force)
     return conversion
 
 
@@ -138,9 +135,15 @@ def convert_scenario(
 
 def carry_out(plan: Plan) -> Conversion:
     """Sample, write, check."""
-    sampled = sample(plan)
-    written = write(plan, sampled)
-    checked = check(plan, written)
+    sampled, lifelike = sample(plan), plan.settings.lane_changes is LaneChanges.LIFELIKE
+    checked = check(plan, write(plan, sampled, lifelike=lifelike))
+    across = {path.entity for path in checked.paths if path.instead}
+    if across and checked.otherwise:
+        plain = check(plan, write(plan, sampled, lifelike=False))
+        why = "with the way that drivers take, what happens would happen otherwise"
+        if plain.otherwise < checked.otherwise:
+            lines = (f"lane changes of '{name}' stay as written: {why}" for name in sorted(across))
+            checked = replace(plain, stays=(*checked.stays, *lines))
     if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
         write_atomically(plan.output, checked.file.data)
     return _conversion(plan, checked)
@@ -198,12 +201,12 @@ def check(plan: Plan, written: Written) -> Written:
 
     def attempt(
         paths: Sequence[OffsetPath], most: float
-    ) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    ) -> tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]:
         trial = written
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
-        place = plan.source if held_at(plan.source) else plan.output
+        place = leads_from(plan.source, plan.output)
         output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = source_meaning.compare(
             output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
@@ -212,36 +215,37 @@ def check(plan: Plan, written: Written) -> Written:
 
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
+    assert run is not None  # what is taken was played in all runs
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warnings = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
     if settings.player_library is not None:
-        warnings += told_by_player(
+        warned += told_by_player(
             settings.player_library, plan.source, (plan.output, best.file.data or b""), source_meaning.runs,
             plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip
     return replace(
-        best, movement=movement, shifts=kept.shifts, warnings=tuple(warnings), trial_contacts=kept.trial_contacts
-    )
+        best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
+        stays=written.stays, otherwise=len(kept.changes) + len(kept.smaller),
+    )  # fmt: skip
 
 
 def _conversion(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
-    movement, file, cut_off = written.movement, written.file, plan.played.motion.cut_off
+    movement, file = written.movement, written.file
     wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
-    warnings = (
-        *(() if cut_off is None else (str(cut_off),)),
-        *map(str, plan.played.motion.doubts),
-        *other_egos(plan.played.scenario, plan.settings, plan.egos),
+    messages = (
+        *plan.played.motion.messages,
+        *warnings(other_egos(plan.played.scenario, plan.settings, plan.egos)),
         *movement.warnings(),
-        *(f"{removed.place.element}: left out ({removed.reason})" for removed in file.removed),
-        *(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
+        *warnings(f"'{name}' is written as a trajectory: {why}" for name, why in plan.unwritable.items()),
         *file.notes,
-        *written.vehicles.frozen,
+        *warnings(written.vehicles.frozen),
         *written.warnings,
-        *(stay_as_written(movement, plan.continuous) if wants_lifelike else ()),
-        *validity_warnings(movement),
-        *((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
+        *warnings(stay_as_written(movement) if wants_lifelike else ()),
+        *warnings(written.stays),
+        *warnings(validity_warnings(movement)),
+        *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )
     return Conversion(
         source=plan.source,
@@ -249,7 +253,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         sha256=file.sha256,
         movement=movement,
         provenance=written.provenance,
-        warnings=warnings,
+        messages=messages,
         content=file.data,
         is_replay=plan.is_replay,
         shifts=written.shifts,

@@ -10,9 +10,9 @@ from typing import Any
 
 from lxml import etree
 
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.conversion.result import ConvertedScenario
-from xosc_lateral.world.motion.nominal import Note
 from xosc_lateral.world.scenario.entity import Entity
 
 ONTOLOGY = "https://openlabel.asam.net/V1-0-0/ontologies/openlabel_ontology_scenario_tags.ttl"
@@ -91,8 +91,8 @@ def quality_result(made: ConvertedScenario) -> bytes:
         "stays_in_lane": [f"{one.name} by {one.beyond:.2f} m at {one.time:.1f} s" for one in movement.departures],
         "all_is_played": list(movement.motion.notes),
     }
-    reported_apart = {*movement.warnings(), *map(str, movement.motion.doubts)}
-    problems["no_other_warning"] = [line for line in made.warnings if line not in reported_apart]
+    apart = {*movement.warnings(), *movement.motion.notes}
+    problems["no_other_warning"] = [note for note in made.messages if note.is_warning and note not in apart]
     root = etree.Element("CheckerResults", version="1.0.0")
     bundle = etree.SubElement(
         root, "CheckerBundle", build_date="", name="xosc-lateral", version=__version__,

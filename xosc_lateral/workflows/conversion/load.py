@@ -86,7 +86,7 @@ def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played
         loaded.scenario, loaded.network, play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
     )
     motion, doubts = played.motion, doubts_about(played.motion, played.network, played.trailers)
-    return replace(played, motion=replace(motion, notes=motion.notes + doubts, doubts=motion.doubts + doubts))
+    return replace(played, motion=replace(motion, notes=(*played.network.notes, *motion.notes, *doubts)))
 
 
 def road_network(path: Path) -> RoadNetwork:

@@ -11,9 +11,10 @@ from collections.abc import Collection, Iterator
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.workflows.conversion.shifts import Change
+from xosc_lateral.workflows.conversion.shifts import STORY_PREFIX, Change
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
 
 WINDOW = 1.0
 """In which somebody who drives is seen to move, or to slide. [s]"""
@@ -35,7 +36,7 @@ def changed_movement(
     for entity in after.entities:
         if entity.name in names:
             source = sources[entity.name]
-            for what, row in _differences(network, source, entity):
+            for what, row in _differences(network, source, entity, _led_across(after, entity)):
                 yield Change(f"'{entity.name}' at {entity.time[row]:.1f} s", entity.name, float(entity.time[row]), what)
 
 
@@ -51,8 +52,20 @@ def moving_share(entity: EntityMotion) -> float | None:
     return float(np.mean(moves[drives])) if drives.any() else None
 
 
-def _differences(network: RoadNetwork, source: EntityMotion, entity: EntityMotion) -> Iterator[tuple[str, int]]:
-    """What is otherwise, and the row in which it is so most."""
+def _led_across(run: NominalMotion, entity: EntityMotion) -> BoolArray:
+    """Rows in which an action of the source leads it along a path: to another lane."""
+    rows = np.zeros(len(entity.time), dtype=np.bool_)
+    for one in run.actions:
+        is_path = isinstance(one.action.content, FollowTrajectoryAction) and not one.path[0].startswith(STORY_PREFIX)
+        if one.actor == entity.name and is_path:
+            rows |= (entity.time >= one.start) & (entity.time <= (np.inf if one.end is None else one.end))
+    return rows
+
+
+def _differences(
+    network: RoadNetwork, source: EntityMotion, entity: EntityMotion, across: BoolArray
+) -> Iterator[tuple[str, int]]:
+    """What is otherwise, and the row in which it is so most; `across`: rows in which a path leads to another lane."""
     slides = [_over_window(one, np.maximum(_longer_way(one), 0.0)) for one in (source, entity)]
     row = int(np.argmax(slides[1]))
     if slides[1][row] > slides[0].max() + LARGEST_SLIDE:
@@ -60,8 +73,8 @@ def _differences(network: RoadNetwork, source: EntityMotion, entity: EntityMotio
     # roads of a junction lie on each other: which one it is on there is anybody's guess
     crossing = np.array([road.junction is not None for road in network.roads])
     turns = [
-        np.where(_is_free(one) & ~crossing[one.road], np.abs(np.sin(one.heading_relative)), 0.0)
-        for one in (source, entity)
+        np.where(is_free & ~crossing[one.road], np.abs(np.sin(one.heading_relative)), 0.0)
+        for one, is_free in ((source, _is_free(source)), (entity, _is_free(entity) & ~across))
     ]
     row = int(np.argmax(turns[1]))
     if turns[1][row] > turns[0].max() + LARGEST_TURN:

@@ -14,11 +14,14 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.own_clock import way_of as way_of_clock
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
+from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept
+from xosc_lateral.workflows.conversion.movement import DRIVING_SPEED
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.offset_path import (
     APPROACH_TIME,
+    SETTLING_LENGTH,
     Bridge,
     Offset,
     OffsetPath,
@@ -29,7 +32,14 @@ from xosc_lateral.world.motion.offset_path import (
     pieces_along,
     spacing_of,
 )
-from xosc_lateral.world.motion.segments import leads_left
+from xosc_lateral.world.motion.segments import (
+    Crossing,
+    bell_share,
+    bell_time,
+    crossings,
+    leads_left,
+    movement_runs,
+)
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
 from xosc_lateral.world.motion.way import LANE_ENDS, Break, way_of
 from xosc_lateral.world.scenario.controllers import Domains
@@ -50,9 +60,17 @@ Path = tuple[str, ...]
 """Names of an action from the story down."""
 
 
-def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
-    """Paths of one entity; none where a controller moves it along, which a path would double."""
-    phases = _Phases(entity, plan)
+SETTLED = 0.5 * APPROACH_TIME
+"""In which a driver whose offset in the new lane is not known is led to it: 0.3 m then take 0.1 m/s2. [s]"""
+
+
+def paths_of(entity: EntityResult, plan: Plan, *, lifelike: bool) -> tuple[list[OffsetPath], list[str]]:
+    """Paths of one entity; none where a controller moves it along, which a path would double.
+
+    `lifelike`: lane changes lead across as drivers take them, where they can. And which of them stay as written, a line
+    each.
+    """
+    phases = _Phases(entity, plan, lifelike=lifelike)
     actions = plan.lateral.by_entity.get(entity.name, ())
     is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
     paths = list[OffsetPath | None]()
@@ -64,13 +82,15 @@ def paths_of(entity: EntityResult, plan: Plan) -> Iterator[OffsetPath]:
     for action in actions:
         if not action.adds and (action.steers is False or (action.steers is None and not is_moved_along)):
             paths.append(phases.after(action.path))
-    return (path for path in paths if path is not None)
+    if not is_moved_along:
+        paths += phases.across.values()
+    return [path for path in paths if path is not None], phases.stays
 
 
 class _Phases:
     """Of one entity, with the offsets that it has in the nominal run there, or else with its longest ones."""
 
-    def __init__(self, entity: EntityResult, plan: Plan) -> None:
+    def __init__(self, entity: EntityResult, plan: Plan, *, lifelike: bool) -> None:
         self._entity, self._plan, self._network = entity, plan, plan.played.network
         motion = entity.motion
         self._own = [one for one in plan.extended.motion.actions if one.actor == entity.name]
@@ -84,6 +104,54 @@ class _Phases:
         )
         self._foreseeing = self._foreseen()
         self._spacing = self._spacing_of(motion)
+        self.across, self.stays, self._crossed = dict[Path, OffsetPath](), list[str](), dict[Path, float]()
+        if lifelike:
+            self._find_across()
+
+    def _find_across(self) -> None:
+        """Paths in place of lane changes; lines on those that stay as written."""
+        motion, found = self._entity.motion, set[Path]()
+        runs = movement_runs(self._plan.extended.motion, motion, self._network, self._entity.spans)
+        for crossing in crossings(self._plan.extended.motion, motion, runs):
+            found.add(crossing.path)
+            if why := crossing.stays or self._kept_for(crossing):
+                what = f"{'lane change' if crossing.is_lane_change else 'lane offset'} of '{motion.name}'"
+                self.stays.append(f"{what} at {motion.time[crossing.first]:.1f} s stays as written: {why}")
+            else:
+                self._crossed[crossing.path] = self._driven_at(sum(bell_time(motion, crossing)))
+                self.across[crossing.path] = self._across(crossing)
+        for path in lane_changes_of(self._plan.played.scenario, motion.name).keys() - found:
+            what = f"lane change '{path[-1]}' of '{motion.name}'"
+            self.stays.append(f"{what} stays as written: it is none in the nominal run, or not a driver's")
+
+    def _kept_for(self, crossing: Crossing) -> str:
+        """Why the player has to take it as written; empty: a path can lead across."""
+        motion, begin = self._entity.motion, float(self._driven[crossing.first])
+        ahead = self._way.next_break(begin)
+        if not crossing.is_lane_change:
+            return "the player takes it"
+        if motion.speed[crossing.first : crossing.last + 1].min() < DRIVING_SPEED:
+            return "it is slow meanwhile"
+        if ahead is not None and ahead.distance < self._driven_at(sum(bell_time(motion, crossing))) + END_MARGIN:
+            return f"no path leads over what is ahead ({ahead.why})"
+        return why_kept(self._plan.played.scenario, crossing.path, motion.name)
+
+    def _across(self, crossing: Crossing) -> OffsetPath:
+        """By the distance driven: whoever is slower than in the nominal run takes longer."""
+        motion, (begin, duration) = self._entity.motion, bell_time(self._entity.motion, crossing)
+        known = crossing.path not in self._plan.depends.begins
+        offset = self._foreseeing if known else self._offset
+        first, last = float(self._driven[crossing.first]), self._crossed[crossing.path]
+        lead_in = float(bell_share(np.array((motion.time[crossing.first] - begin) / duration)))
+
+        def way(distance: FloatArray) -> FloatArray:
+            time = np.interp(distance, self._driven, motion.time)
+            done = bell_share(np.clip((time - begin) / duration, 0.0, 1.0))
+            return np.asarray(offset(distance) + crossing.way[-1] * (done - lead_in) / (1.0 - lead_in))
+
+        pieces = tuple(pieces_along(way, self._spacing, (first, last), calm_end=True))
+        end = float(offset(np.array([last]))[0])
+        return OffsetPath(motion.name, crossing.path, pieces, self._way.side_at(first), end=end, instead=True)
 
     def _foreseen(self) -> Offset:
         """The offset, with what a driver does before lane changes that no vehicle under test decides to begin."""
@@ -125,10 +193,25 @@ class _Phases:
     def after(self, action: Path) -> OffsetPath | None:
         """From the end of an action in the nominal run, or else as on the longest segment."""
         ends = [played.end for played in self._own if played.path == action and played.end is not None]
+        if action in self.across:
+            return self._settled(action)
         if ends:
             return self._path(action, self._driven_at(min(ends)), 0.0)
         longest = max(self._entity.segments, key=lambda segment: segment.span.end - segment.span.start)
         return self._path(action, self._driven_at(longest.span.start), 0.0, is_nominal=False)
+
+    def _settled(self, action: Path) -> OffsetPath | None:
+        """From the end of a path across on, where its driver is by then: known if it began where it nominally does."""
+        motion, depends, begin = self._entity.motion, self._plan.depends, self._crossed[action]
+        if action not in depends.begins and motion.name not in depends.entities:
+            return self._path(action, begin, self.across[action].end)
+        length = max(SETTLED * self._speed_at(begin), SETTLING_LENGTH)
+        aside = float(self._offset(np.array([begin + length]))[0])
+        path = self._path(action, begin + length, aside)
+        row = min(int(np.searchsorted(self._driven, begin)), len(motion.time) - 1)
+        direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
+        there = direction * float(motion.offset[row]) + self._way.side_at(begin) * aside
+        return path if path is None else structs.replace(path, settles=(there, length))
 
     def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
         """From places on; each keeps the offset that the path before ended with, as long as no action is between."""

@@ -59,7 +59,7 @@ class Prepared:
     def holds_for(self, source: Path, settings: ConvertSettings) -> bool:
         """Whether it is what would be read and played now: nothing but its file and its road was looked for."""
         scenario = self.loaded.scenario
-        if (source, _asked(settings)) != (self._source, self._asked) or scenario.catalog_locations or scenario.remarks:
+        if (source, _asked(settings)) != (self._source, self._asked) or scenario.catalog_locations or scenario.notes:
             return False
         if state_key(check_regular(source)) != self._state:
             return False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note, Telling, warnings
 from xosc_lateral.base.rates import rate
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.resampling import STEP
@@ -192,24 +193,18 @@ class Enriched:
         """Contacts and lane departures that nominally are none. [-]"""
         return len(self.new_contacts) + len(self.departures)
 
-    def warnings(self) -> tuple[str, ...]:
-        """What a user has to know, a line each."""
-        lines = [
-            f"{a} and {b} touch at {gap.time:.1f} s in the {NOMINAL_RUN} run (without the offsets they do not)"
-            for gap in self.new_contacts
-            for a, b in [gap.names]
-        ]
-        lines += [
-            f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
-            for departure in self.departures
-        ]
-        lines += [
-            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
-            for entity in self.entities
-            if entity.neutral
-        ]
-        lines += [f"{entity.name}: {entity.bound}" for entity in self.entities if entity.bound is not None]
-        return tuple(lines)
+    def warnings(self) -> Iterator[Note]:
+        """What a user has to know of it."""
+        for gap in self.new_contacts:
+            what = f"{' and '.join(gap.names)} touch at {gap.time:.1f} s, and without the offsets they do not"
+            yield Note(what, is_warning=True, run=NOMINAL_RUN)
+        for departure in self.departures:
+            what = f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
+            yield Note(what, is_warning=True, entity=departure.name, run=NOMINAL_RUN)
+        for entity in self.entities:
+            unknown = f"{', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
+            lines = [unknown] * bool(entity.neutral) + [entity.bound] * (entity.bound is not None)
+            yield from warnings((f"{entity.name}: {what}" for what in lines), entity=entity.name)
 
 
 class EventShift(Struct, frozen=True):
@@ -253,7 +248,7 @@ class ConversionProvenance:
 
 
 @dataclass(eq=False, repr=False, slots=True)
-class ConvertedScenario:
+class ConvertedScenario(Telling):
     """A converted scenario: nominal and enriched motion, what to know about it, and how to get it again."""
 
     source: Path  # the scenario that was read
@@ -261,7 +256,7 @@ class ConvertedScenario:
     sha256: str  # of the output's bytes
     movement: Enriched  # nominal and enriched motion, segments, gaps
     provenance: ConversionProvenance
-    warnings: tuple[str, ...] = ()  # what a user has to know, a line each
+    messages: tuple[Note, ...] = ()  # what a user has to know
     content: bytes = b""  # the output's bytes, but for a replay that was written
     is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives
     # shifts: how much earlier or later events of a reactive output come, in the nominal run and under other egos [s]

@@ -58,9 +58,9 @@ class ConvertSettings:
         How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
         profile's answer is not known; not at all. Without: as configured, else "borrow".
     lane_changes : {"written", "lifelike"}
-        The way across of lane changes and lane offsets of 3 to 13 s, where a vehicle follows a trajectory: as written,
-        or as drivers take it (a bell that is slightly early); start, duration and lane stay the file's. Without: as
-        configured, else "written".
+        The way across of lane changes and lane offsets of 3 to 13 s: as written, or as drivers take it (a bell that is
+        slightly early); start, duration and lane stay the file's. Of vehicles that react, lane changes whose end
+        nothing waits for, by the distance driven. Without: as configured, else "written".
     mode : {"auto", "trajectory", "lane-offset"}
         Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
         those whose motion depends on a vehicle under test.
@@ -116,7 +116,7 @@ class ConvertSettings:
     )
     lane_changes: LaneChanges = option(
         LaneChanges.WRITTEN, say.one_of(LaneChanges), kind=LaneChanges | None, cell=say.as_it_is, show_default=False,
-        help="The way across of lane changes on a trajectory: as written (default), or lifelike: as drivers take it.",
+        help="The way across of lane changes: as written (default), or lifelike: as drivers take it.",
     )
     context: Path | None = option(
         None, Path, kind=Path | None, cell=say.beside,

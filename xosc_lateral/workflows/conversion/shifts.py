@@ -20,6 +20,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.limits import REPEATED_RUNS
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.rates import rate
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
@@ -30,6 +31,7 @@ from xosc_lateral.world.scenario.dependence import entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
+    FollowTrajectoryAction,
     LaneChangeAction,
     LaneOffsetAction,
     LateralDistanceAction,
@@ -66,7 +68,13 @@ class Change(Struct, frozen=True):
 
     def __str__(self) -> str:
         """One line."""
-        return f"{self.what} {self.how} with the offsets" + (f" (run: {self.run})" if self.run else "")
+        return str(self.note)
+
+    @property
+    def note(self) -> Note:
+        """It as a warning."""
+        what = f"{self.what} {self.how} with the offsets"
+        return Note(what, is_warning=True, entity=self.entity, run=self.run or None)
 
 
 class Comparison(Struct, frozen=True):
@@ -159,6 +167,7 @@ class _Shifts:
         self._ends = before.end_time, after.end_time
         self._triggers = _triggers_of(scenario)
         self._starts, self._over = dict[Path, float](), dict[Path, float]()
+        self._last = dict[Path, float]()  # when the last of an element's actions is over [s]
         self._of_entity = dict[str, list[float]]()
         self._start_times = dict[str, list[tuple[float, float]]]()
         self.largest = 0.0
@@ -179,7 +188,9 @@ class _Shifts:
         begun.append((then.start, start))
         for depth in range(1, len(path) + 1):
             self._starts.setdefault(path[:depth], start)
-            self._over[path[:depth]] = end
+            last = float("inf") if now.end is None else now.end
+            if last >= self._last.get(path[:depth], 0.0):
+                self._last[path[:depth]], self._over[path[:depth]] = last, end
         if actor is not None:
             self._of_entity.setdefault(actor, []).extend((start, end))
         self.largest = max(self.largest, start, end)
@@ -224,11 +235,12 @@ class _Shifts:
         return causes if causes and not others else [*causes, 0.0]
 
     def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
-        """By how much longer the action may last for its way. [s]"""
+        """By how much longer the action may last for its way; a path in its place, for as long as it will. [s]"""
         powers = _powers(then)
         duration = (then.end or 0.0) - then.start
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
-        if ways[0] < LEAST_WAY <= ways[1]:  # over at once from the middle; from beside it, it takes its time
+        is_path = isinstance(now.action.content, FollowTrajectoryAction) and isinstance(then.action.content, LATERAL)
+        if is_path or ways[0] < LEAST_WAY <= ways[1]:  # over at once from the middle; from beside it, it takes its time
             return [(now.end or 0.0) - now.start - duration]
         if not powers or min(ways) < LEAST_WAY:
             return [0.0]

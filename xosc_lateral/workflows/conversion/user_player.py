@@ -13,6 +13,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.apart import apart
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, later
 from xosc_lateral.workflows.live.esmini_library import StoryboardCallback, open_player
@@ -70,8 +71,8 @@ def told_by_player(
     egos: Collection[str],
     moved: Collection[str],
     allowed: float,
-) -> Iterator[str]:
-    """What happens otherwise with an output, a line each.
+) -> Iterator[Note]:
+    """What happens otherwise with an output.
 
     - `output`: where it will lie, and its content
     - `runs`: how vehicles under test drive, each with its name
@@ -85,7 +86,7 @@ def told_by_player(
             driven = {one.name: _driven(one, network) for one in run.entities if one.name in egos}
             before, after = (happens(path, str(library), driven, run.end_time) for path in (source, Path(file.name)))
             for what in _otherwise(before, after, run, moved, allowed + EVENT_TOLERANCE):
-                yield f"in the player at {library}: {what} (run: {name})"
+                yield Note(f"in the player at {library}: {what}", is_warning=True, run=name)
 
 
 def _driven(entity: EntityMotion, network: RoadNetwork) -> FloatArray:

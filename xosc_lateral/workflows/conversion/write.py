@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import BEHAVIOUR, __version__
-from xosc_lateral.files.held import held_at
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.files.remote import leads_from
 from xosc_lateral.workflows.conversion.phases import paths_of
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift
@@ -29,8 +30,10 @@ class Written:
     provenance: ConversionProvenance
     file: WrittenScenario
     shifts: tuple[EventShift, ...] = ()
-    warnings: tuple[str, ...] = ()  # of the check
+    warnings: tuple[Note, ...] = ()  # of the check
     trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
+    stays: tuple[str, ...] = ()  # lane changes of these paths' entities that stay as written, a line each
+    otherwise: int = 0  # what happens otherwise in the check, and whose moves are smaller for that
 
     @property
     def with_lane_offsets(self) -> frozenset[str]:
@@ -38,10 +41,13 @@ class Written:
         return frozenset(path.entity for path in self.paths)
 
 
-def write(plan: Plan, sampled: Enriched) -> Written:
-    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked."""
+def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
+    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked.
+
+    `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can.
+    """
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    place = plan.source.parent if held_at(plan.source) else plan.output.parent
+    place = leads_from(plan.source, plan.output).parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,
@@ -61,8 +67,9 @@ def write(plan: Plan, sampled: Enriched) -> Written:
         content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    paths = [path for entity in reactive for path in paths_of(entity, plan)]
-    return write_with(paths, plan, sampled, vehicles, provenance)
+    found = [paths_of(entity, plan, lifelike=lifelike) for entity in reactive]
+    written = write_with([path for paths, _ in found for path in paths], plan, sampled, vehicles, provenance)
+    return replace(written, stays=tuple(line for _, lines in found for line in lines))
 
 
 def write_with(

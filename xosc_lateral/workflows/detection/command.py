@@ -16,8 +16,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.workflows.detection.detectors import RULES, Detector
-from xosc_lateral.workflows.detection.observation import View
-from xosc_lateral.workflows.detection.tracks import STEP, Scene
+from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Measured, View, measure
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene
 
 ANSWER_TIME = 10.0
 """An answer has to come within this; the first may take longer, while the program starts. [s]"""
@@ -76,7 +76,11 @@ def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any]
     measured = {view.number: view.measured for view in views}
     first = min(track.first for track in scene.tracks)
     last = max(track.first + len(track) for track in scene.tracks)
-    known = [_columns(track, measured.get(number), scene) for number, track in enumerate(scene.tracks)]
+    nobody = np.random.default_rng(0)  # the ego, say, knows itself: a sensor without errors draws nothing
+    known = [
+        _columns(track, measured.get(number) or measure(track, PERFECT_SENSOR, nobody), scene)
+        for number, track in enumerate(scene.tracks)
+    ]
     for instant in range(first, last):
         vehicles = {
             track.name: {name: values[instant - track.first] for name, values in columns.items()} | fixed
@@ -87,13 +91,13 @@ def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any]
         yield line, (round(STEP * first, 3), instant)
 
 
-def _columns(track: Any, measured: Any, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+def _columns(track: LaneTrack, measured: Measured, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
     """Values of a track that change, as lists, and those that don't; what is not known is left out."""
-    taken = np.arange(len(track)) if measured is None else measured.taken
-    offset = track.offset if measured is None else measured.offset
-    values: dict[str, Any] = {"offset": offset, "lane_width": track.lane_width[taken], "speed": track.speed[taken]}
-    if measured is not None:
-        values["lateral_speed"] = measured.speed
+    taken = measured.taken
+    values: dict[str, Any] = {
+        "offset": measured.offset, "lateral_speed": measured.speed, "lane_width": track.lane_width[taken],
+        "speed": track.speed[taken],
+    }  # fmt: skip
     if "x" in track.columns:
         values |= {"x": track.x[taken], "y": track.y[taken], "heading": track.heading[taken]}
     columns: dict[str, list[Any]] = {name: np.round(one, 6).tolist() for name, one in values.items()}

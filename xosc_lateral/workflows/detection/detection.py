@@ -63,9 +63,9 @@ class Detection(Result):
 
     def __str__(self) -> str:
         lines = aligned([self.headings, *(cells(row) for row in self.rows())])
-        return "\n".join([self.headline(), "", *lines, "", *self.notes()])
+        return "\n".join([self.headline(), "", *lines, "", *self.legend()])
 
-    def notes(self) -> Sequence[str]:
+    def legend(self) -> Sequence[str]:
         """What the numbers count, and what can't be read from them."""
         lines = [
             "False alarms: alarms that begin while a vehicle keeps its lane, an hour, seen from one neighbouring lane. "
@@ -163,7 +163,7 @@ class Detection(Result):
 
         html = partial(
             detection_page,
-            lead=[f"{self.headline()}.", *self.notes()],
+            lead=[f"{self.headline()}.", *self.legend()],
             table=[dict(zip(self.headings, cells(row), strict=True)) for row in self.rows()],
             curves=self.curves,
             worst=self.worst(),

@@ -136,7 +136,7 @@ class Sight(Result):
         count = sum(map(len, self.moments.values()))
         return f"{count} moments behind two cars in {len(self.moments)} sources"
 
-    def notes(self) -> list[str]:
+    def legend(self) -> list[str]:
         """What the numbers count."""
         return [
             "Every second of every vehicle that has two others ahead in its lane (with an ego: of the ego). Boxes seen "
@@ -146,7 +146,7 @@ class Sight(Result):
         ]
 
     def __str__(self) -> str:
-        return "\n".join([self.headline(), "", *aligned([HEADINGS, *map(_cells, self.rows())]), "", *self.notes()])
+        return "\n".join([self.headline(), "", *aligned([HEADINGS, *map(_cells, self.rows())]), "", *self.legend()])
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each source and sensor. Shares, [m]"""
@@ -215,7 +215,7 @@ class Sight(Result):
         from xosc_lateral.files.pages.page import Page
 
         page = Page("Range of vision")
-        page.lead(f"{self.headline()}.", *self.notes())
+        page.lead(f"{self.headline()}.", *self.legend())
         page.section("Table")
         page.table([dict(zip(HEADINGS, _cells(row), strict=True)) for row in self.rows()], "In brackets 95 % intervals")
         page.section("By distance")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,9 +14,10 @@ from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
 from xosc_lateral.files.held import Held, exists
 from xosc_lateral.files.mapping import TableMapping, as_mapping
+from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.tables import TABLE_SUFFIXES
-from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, document_kind
+from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, Request, concrete, document_kind
 from xosc_lateral.workflows.conversion.convert import carry_out
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
@@ -77,17 +79,36 @@ def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
     if not scenarios:
         return [_measured(path, settings)]
     base = path if path.is_dir() else path.parent
-    named = [(scenario, scenario.relative_to(base).with_suffix("").as_posix()) for scenario in scenarios]
-    sources = [Source(path.stem, lambda: _written(named, settings), tuple(scenarios))]
+    named = list(_named(scenarios, base, settings.convert))
+    files = tuple(dict.fromkeys((*scenarios, *(each[0] for each in named))))
+    sources = [Source(path.stem, lambda: _written(named, settings), files)]
     profiles = settings.profiles if settings.variants else ()
-    return [*sources, *(_lifelike(path.stem, named, profile, settings) for profile in profiles)]
+    return [*sources, *(_lifelike(path.stem, named, profile, settings, files) for profile in profiles)]
+
+
+Named: TypeAlias = tuple[Path, str, ConvertSettings, int]
+"""A scenario, what it is called, its settings with the values of its parameters, and the number of that set."""
 
 
 def _scenarios(path: Path) -> list[Path]:
-    if path.is_dir():
-        every = sorted(one for one in path.rglob(f"*{SCENARIO_SUFFIX}") if one.is_file())
-        return [one for one in every if document_kind(one) in (DocumentKind.SCENARIO, DocumentKind.CONVERTED)]
-    return [path] if path.name.lower().endswith(SCENARIO_SUFFIX) else []
+    """Scenarios and parameter distributions; in a folder, no scenario that a distribution beside it varies."""
+    if not path.is_dir():
+        return [path] if path.name.lower().endswith(SCENARIO_SUFFIX) else []
+    kinds = {one: document_kind(one) for one in sorted(path.rglob(f"*{SCENARIO_SUFFIX}")) if one.is_file()}
+    varied = {read_distribution(one).scenario_file.resolve()
+              for one, kind in kinds.items() if kind is DocumentKind.DISTRIBUTION}  # fmt: skip
+    return [one for one, kind in kinds.items() if kind is not DocumentKind.CATALOG and one.resolve() not in varied]
+
+
+def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> Iterator[Named]:
+    """Each scenario, and each set of parameters of a distribution."""
+    for path in scenarios:
+        name = path.relative_to(base).with_suffix("").as_posix()
+        sets = concrete(Request(path, convert), document_kind(path))
+        for number, (scenario, suffix, settings, why) in enumerate(sets):
+            if why:
+                raise FormatError(why)
+            yield scenario, f"{name}{suffix}", settings, number
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
@@ -103,34 +124,37 @@ def _measured(path: Path, settings: SourceSettings) -> Source:
 
 
 # ---- scenarios -------------------------------------------------------------------------------------------------------
-def _written(named: Sequence[tuple[Path, str]], settings: SourceSettings) -> Iterator[Scene]:
+def _written(named: Sequence[Named], settings: SourceSettings) -> Iterator[Scene]:
     """Each scenario as it is."""
-    for scenario, name in named:
-        yield played_scene(_play(scenario, settings), name, settings.ego)
+    for scenario, name, convert, _ in named:
+        yield played_scene(_play(scenario, convert), name, settings.ego)
 
 
-def _lifelike(label: str, named: Sequence[tuple[Path, str]], profile: str, settings: SourceSettings) -> Source:
+def _lifelike(
+    label: str, named: Sequence[Named], profile: str, settings: SourceSettings, files: tuple[Path, ...]
+) -> Source:
     """Each scenario's variants, converted and played as what is written plays."""
     ego = None if settings.ego is None else frozenset({settings.ego} - {"none"})
-    convert = replace(settings.convert, profile=profile, ego=ego)
 
     def scenes() -> Iterator[Scene]:
-        for scenario, name in named:
+        for scenario, name, own, number in named:
+            convert = replace(own, profile=profile, ego=ego)
             prepared = prepare(scenario, convert)
             for variant in range(settings.variants):
-                made = carry_out(decide(prepared, convert, output=scenario, variant_index=variant, saves=False))
+                index = number * settings.variants + variant  # each set has offsets of its own
+                made = carry_out(decide(prepared, convert, output=scenario, variant_index=index, saves=False))
                 written = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
                 motion = play(written, prepared.played.network, step=STEP, time_limit=convert.time_limit)
-                ego = settings.ego or next(iter(made.provenance.ego), "none")
+                ego_name = settings.ego or next(iter(made.provenance.ego), "none")
                 played = Played(written, prepared.played.network, motion)
-                yield played_scene(played, f"{name} #{variant + 1}", ego, cluster=name)
+                yield played_scene(played, f"{name} #{variant + 1}", ego_name, cluster=name)
 
-    return Source(f"{label}, {profile}", scenes, tuple(scenario for scenario, _ in named))
+    return Source(f"{label}, {profile}", scenes, files)
 
 
-def _play(scenario: Path, settings: SourceSettings) -> Played:
-    convert = settings.convert
-    return play_scenario(scenario, step=STEP, time_limit=convert.time_limit, allowed=convert.allow, roads=convert.roads)
+def _play(scenario: Path, convert: ConvertSettings) -> Played:
+    return play_scenario(scenario, parameters=convert.parameters, step=STEP, time_limit=convert.time_limit,
+                         allowed=convert.allow, roads=convert.roads)  # fmt: skip
 
 
 def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "") -> Scene:

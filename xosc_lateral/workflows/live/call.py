@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note, notes, warnings
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.workflows.live.loop import later_actions, not_driven, run_to_end
@@ -87,9 +88,9 @@ def live_esmini(
     standing = [name for name in sorted(traffic.waits) if len({row[2:4] for row in rows if row[1] == name}) == 1]
     stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
              "with EsminiTraffic" for name in standing]  # fmt: skip
-    warnings = [*traffic.warnings, *traffic.traffic.fault_lines(), *stood]
-    notes = [*later_actions(Path(scenario), traffic.spans, duration), *not_driven(traffic.undriven)]
-    return LiveRun(rows, settings, warnings, scene, events, notes)
+    warned = warnings([*traffic.warnings, *traffic.traffic.fault_lines(), *stood])
+    noted = notes([*later_actions(Path(scenario), traffic.spans, duration), *not_driven(traffic.undriven)])
+    return LiveRun(rows, settings, (*warned, *noted), scene, events)
 
 
 @declare_options
@@ -140,32 +141,34 @@ def live_sumo(
     counts = [f"SUMO reports {count} {what}" for what, count in traffic.counts.items() if count]
     under_test = [name for name in traffic.entities if name in traffic.ego]
     scene = Scene(tuple(traffic.entities.values()), partial(sumo_network, net), under_test, is_road=False)
-    notes = not_driven({name: f"it is under test{traffic.ego.why(name)}" for name in under_test})
-    return LiveRun(rows, settings, [*traffic.warnings, *traffic.traffic.fault_lines(), *counts], scene, notes=notes)
+    noted = notes(not_driven({name: f"it is under test{traffic.ego.why(name)}" for name in under_test}))
+    warned = warnings([*traffic.warnings, *traffic.traffic.fault_lines(), *counts])
+    return LiveRun(rows, settings, (*warned, *noted), scene)
 
 
 class LiveRun(Result):
     """A run of a simulation with drivers in it."""
 
-    __slots__ = ("_rows", "_scene", "_settings", "events", "notes", "warnings")
+    __slots__ = ("_messages", "_rows", "_scene", "_settings", "events")
 
     def __init__(
         self,
         rows: Sequence[tuple[Any, ...]],
         settings: Mapping[str, Any],
-        warnings: Sequence[str],
+        messages: Sequence[Note],
         scene: Scene,
         events: Sequence[tuple[float, str, int]] = (),
-        notes: Sequence[str] = (),
     ) -> None:
         self._rows = pd.DataFrame(rows, columns=list(TRACE_COLUMNS))
         self._settings, self._scene = dict(settings), scene
-        self.warnings = tuple(warnings)
-        """What a user has to know, a line each."""
+        self._messages = tuple(messages)
         self.events = tuple(events)
         """Changes of storyboard elements: time [s], path, state."""
-        self.notes = tuple(notes)
-        """What else drivers did or did not, a line each."""
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """What a user has to know, and what else drivers did or did not."""
+        return self._messages
 
     def headline(self) -> str:
         """One line."""
@@ -176,8 +179,7 @@ class LiveRun(Result):
         return f"{source}: {time:g} s, {steered} of {names} vehicles driven by {profile}, seed {seed}"
 
     def __str__(self) -> str:
-        lines = [("warning", line) for line in self.warnings] + [("note", line) for line in self.notes]
-        return "\n".join([self.headline(), *(f"  {word}: {line}" for word, line in lines)])
+        return "\n".join([self.headline(), *self.message_lines()])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per vehicle and step, see `STATE_COLUMNS`; SI units, offsets positive left of travel."""
@@ -185,7 +187,13 @@ class LiveRun(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""
-        return {"rows": len(self._rows), "warnings": list(self.warnings), "notes": list(self.notes), **self._settings}
+        messages = {"warnings": list(self.warnings), "notes": list(self.notes)}
+        return {
+            "rows": len(self._rows),
+            **messages,
+            "messages": self.message_records(),
+            **self._settings,
+        }
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""

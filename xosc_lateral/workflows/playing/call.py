@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note, notes
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from xosc_lateral.world.motion.segments import SegmentRow
 
 
+STRICT = flag("--strict", help="No vehicle catalog, a run cut off, a doubt: an error.")
+
+
 @declare_options
 def play(
     scenario: DocumentLike, *,
@@ -30,7 +34,7 @@ def play(
     allow: Paths = (),
     road: RoadLike | None = None,
     road_path: Paths = (),
-    strict: Annotated[bool, flag("--strict", help="No vehicle catalog, a run cut off, a doubt: an error.")] = False,
+    strict: Annotated[bool, STRICT] = False,
 ) -> Playback:  # fmt: skip
     """Play a scenario's maneuvers, without offsets.
 
@@ -74,6 +78,7 @@ def segments(
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
     road: RoadLike | None = None,
+    strict: Annotated[bool, STRICT] = False,
 ) -> Segments:
     """Road-following segments of every entity, and why the rest is none; see `play`."""
     from xosc_lateral.world.scenario.controllers import controlled_entities
@@ -81,11 +86,13 @@ def segments(
     played = (
         scenario
         if isinstance(scenario, Playback)
-        else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow, road=road)
+        else play(
+            scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow, road=road, strict=strict
+        )
     )
     driven = controlled_entities(played._played.scenario)
     lines = tuple(f"'{name}' is driven by controller {control}" for name, control in driven.items())
-    return Segments(scenario_segments(played._played), lines)
+    return Segments(scenario_segments(played._played), lines, played.messages)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,20 +123,9 @@ class Playback(Result):
         return self._played.motion.ended_by
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What was not played, or not as written: a line each, with file and line."""
-        return tuple(map(str, self._played.motion.notes))
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Of the notes, what can hardly be meant: found by a check after every play."""
-        return tuple(map(str, self._played.motion.doubts))
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """That the time limit cut the run off."""
-        note = self._played.motion.cut_off
-        return () if note is None else (str(note),)
+    def messages(self) -> tuple[Note, ...]:
+        """What was not played, or not as written; as warnings what can hardly be meant, and a run that was cut off."""
+        return self._played.motion.messages
 
     def headline(self) -> str:
         """One line."""
@@ -138,8 +134,7 @@ class Playback(Result):
         return f"{self.scenario.name}: {len(self.entities)} entities, {self.end_time:.2f} s ({ended}){noted}"
 
     def __str__(self) -> str:
-        warned = [f"  warning: {line}" for line in self.warnings]
-        return "\n".join([self.headline(), *(f"  note: {note}" for note in self.notes), *warned])
+        return "\n".join([self.headline(), *self.message_lines()])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per entity and step: `time,name,x,y,z,h,speed,road,lane,offset_t,s`, SI units."""
@@ -157,6 +152,7 @@ class Playback(Result):
             "entities": list(self.entities),
             "notes": list(self.notes),
             "warnings": list(self.warnings),
+            "messages": self.message_records(),
             "provenance": self._provenance(),
         }
 
@@ -241,6 +237,12 @@ class Segments(Result):
     _rows: tuple[SegmentRow, ...]
     controllers: tuple[str, ...] = ()
     """Which controllers drive which entity at some time, a line each."""
+    _messages: tuple[Note, ...] = ()  # of the run
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """Those of the run, and `controllers`."""
+        return (*self._messages, *notes(self.controllers))
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -259,7 +261,7 @@ class Segments(Result):
             + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
             for row in self._rows
         ]
-        return "\n".join([*lines, *(f"note: {line}" for line in self.controllers)])
+        return "\n".join([*lines, *self.message_lines()])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
@@ -272,7 +274,7 @@ class Segments(Result):
 
         rows = [structs.asdict(row) for row in self._rows]
         rounded = [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]
-        return {"segments": rounded, "controllers": list(self.controllers)}
+        return {"segments": rounded, "controllers": list(self.controllers), "messages": self.message_records()}
 
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:

@@ -11,13 +11,13 @@ from math import inf
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.rows import blocks, rows_where
 from xosc_lateral.world.motion.gaps import box_distance, corners
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion, Note
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion
 from xosc_lateral.world.player.distances import HEIGHT_APART
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.place import Place
 
 LEAP_DISTANCE = 0.3
 """Further than who drives and slides aside at `MAXIMUM_LATERAL_SPEED`, and aside by this much more: a leap. [m]"""
@@ -45,17 +45,15 @@ def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str
     return tuple(notes)
 
 
-def _note(what: str, place: Place) -> Note:
-    return Note(what, place.path, place.line, place.element)
-
-
 def _jumps(entity: EntityMotion) -> Iterator[Note]:
     """The first jump that nobody asked for, and how many there are."""
     jumps = leaps(entity)
     if jumps:
         (time, length), more = jumps[0], f" ({len(jumps)} times in all)" if len(jumps) > 1 else ""
         why = "further than its speed explains: the lane that it follows ends, or its road has a gap"
-        yield _note(f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", entity.entity.place)
+        yield entity.entity.place.note(
+            f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", is_warning=True
+        )
 
 
 def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
@@ -90,7 +88,7 @@ def _lanes_for_nobody(entity: EntityMotion, network: RoadNetwork) -> Iterator[No
             if before in DRIVING and here and here not in DRIVING and not guided:
                 where = f"lane {lane[k]} of road '{network.road_ids[road[k]]}', of type {here}"
                 what = f"'{entity.name}' comes onto {where}, at {entity.time[rows.start - 1 + k]:.2f} s by itself"
-                yield _note(what, entity.entity.place)
+                yield entity.entity.place.note(what, is_warning=True)
                 return
 
 
@@ -122,7 +120,7 @@ def _off_route(
             at += 1 + roads[at + 1 :].index(road)
         elif network.roads[road].junction is None and 0 <= at < len(roads) - 1 and not entity.activity[k] & _LED:
             where = f"on road '{network.road_ids[road]}', at {entity.time[k]:.2f} s"
-            yield _note(f"'{entity.name}' leaves its route: it is {where}", route.place)
+            yield route.place.note(f"'{entity.name}' leaves its route: it is {where}", is_warning=True)
             return
     for number, (road, lane, s) in enumerate(route.stops, start=1):
         on = np.flatnonzero(entity.road[begin:end] == road) + int(begin)
@@ -134,7 +132,7 @@ def _off_route(
             row = int(over[0])
             beside = f"in lane {entity.lane[row]} of road '{network.road_ids[road]}' instead of {lane}"
             what = f"'{entity.name}' passes waypoint {number} of its route {beside}, at {entity.time[row]:.2f} s"
-            yield _note(what, route.place)
+            yield route.place.note(what, is_warning=True)
 
 
 def _changes(values: Int32Array) -> IndexArray:
@@ -153,7 +151,7 @@ def _overlaps(motion: NominalMotion, trailers: dict[str, str]) -> Iterator[Note]
                 continue
             if _touch(entity, other, row):
                 what = f"'{entity.name}' appears in '{other.name}': their boxes overlap at {entity.time[row]:.2f} s"
-                yield _note(what, entity.entity.place)
+                yield entity.entity.place.note(what, is_warning=True)
 
 
 def _touch(entity: EntityMotion, other: EntityMotion, row: int) -> bool:

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.rates import rate
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, shown_rows
 from xosc_lateral.workflows.playing.scene import lane_surfaces, markings, scene_of
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion, Note
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
@@ -294,7 +295,7 @@ def add_notes(page: Page, notes: Sequence[Note]) -> None:
         page.text("Nothing: every action and condition was played as the scenario states it.")
         return
     rows = [
-        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        {"what": note.what, "element": note.element, "file": Path(note.path or "").name, "line": str(note.line or "")}
         for note in notes
     ]
     page.table(rows, "What was left out or played differently")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -89,6 +90,11 @@ class Evaluation(Result):
 
         return worst_block(self._scores)
 
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """Rows of the tables that are in no drive."""
+        return self._tables.messages
+
     def headline(self) -> str:
         """One line."""
         block, ratio = self.worst
@@ -98,7 +104,8 @@ class Evaluation(Result):
     def __str__(self) -> str:
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_text
 
-        return evaluation_text(self._scores, self.profile, self._tables.inputs)
+        text = evaluation_text(self._scores, self.profile, self._tables.inputs)
+        return "\n".join([text, *self.message_lines()])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
@@ -115,7 +122,8 @@ class Evaluation(Result):
         """Plain values, as ``--json`` prints them."""
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_record
 
-        return evaluation_record(self._scores, self.profile, self._tables.inputs)
+        record = evaluation_record(self._scores, self.profile, self._tables.inputs)
+        return record | {"messages": self.message_records()}
 
     def plot(self) -> Figure:
         """Violins of the ten metrics, measured beside sampled."""

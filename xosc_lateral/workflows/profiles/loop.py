@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.result import (
@@ -176,6 +177,11 @@ class ClosedLoop(Result):
         self._proofs: tuple[str, ...] | None = None
 
     @property
+    def messages(self) -> tuple[Note, ...]:
+        """Rows of the tables that are in no drive."""
+        return self._given.messages
+
+    @property
     def profile(self) -> DriverProfile:
         """The refined profile."""
         return self._result.refined
@@ -226,7 +232,7 @@ class ClosedLoop(Result):
     def __str__(self) -> str:
         from xosc_lateral.workflows.profiles.loop_page import loop_text
 
-        return loop_text(self._result)
+        return "\n".join([loop_text(self._result), *self.message_lines()])
 
     def to_frame(self, table: Literal["findings", "shown"] = "findings") -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ...
@@ -244,7 +250,7 @@ class ClosedLoop(Result):
 
         record: dict[str, Any] = finite(loop_record(self._result, self._given.files))
         record["provenance"]["inputs"] = dict(self._given.inputs)
-        return record
+        return record | {"messages": self.message_records()}
 
     def plot(self) -> Figure:
         """Residual by context, before and after."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note, warnings
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.drives import file_label
@@ -74,9 +75,8 @@ def sample(
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
         unknown = ", ".join(column for column in driver.columns if column not in {"speed", "lane_width"})
-        return Offsets(
-            driver, made, seed, None, settings, (f"a free run: {unknown} {LEFT_OUT_NOTE}",) if unknown else ()
-        )
+        messages = warnings([f"a free run: {unknown} {LEFT_OUT_NOTE}"] if unknown else [])
+        return Offsets(driver, made, seed, None, settings, messages)
     tables = None if context is None else _context_alone(context, driver, lane_width, columns)
     if tables is None:
         tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
@@ -86,9 +86,8 @@ def sample(
             made = list(sample_like(driver, drives, snippet, seed, with_sensor=with_sensor))
     else:
         made = list(sample_context(driver, drives, seed, with_sensor=with_sensor))
-    return Offsets(
-        driver, made, seed, tables, {} if like is None else {"snippet_s": snippet}, _unknown_columns(driver, drives)
-    )
+    messages = (*tables.messages, *warnings(_unknown_columns(driver, drives)))
+    return Offsets(driver, made, seed, tables, {} if like is None else {"snippet_s": snippet}, messages)
 
 
 def _context_alone(
@@ -156,8 +155,8 @@ class Offsets(Result):
     seed: int
     _tables: GivenDrives | None
     _settings: dict[str, Any]
-    warnings: tuple[str, ...]
-    """What a user has to know, a line each."""
+    messages: tuple[Note, ...] = ()
+    """What a user has to know."""
 
     def __len__(self) -> int:
         return sum(len(each.time) for each in self._made)
@@ -168,7 +167,7 @@ class Offsets(Result):
         return f"{len(self)} offsets of {self.profile.name}, {len(self._made)} {runs}, seed {self.seed}"
 
     def __str__(self) -> str:
-        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+        return "\n".join([self.headline(), *self.message_lines()])
 
     def to_frame(self) -> pd.DataFrame:
         """Columns `drive`, `time` [s], `offset`, `lane_width` [m], `speed` [m/s] where known; of snippets also
@@ -197,6 +196,7 @@ class Offsets(Result):
             "rows": len(self),
             "runs": len(self._made),
             "warnings": list(self.warnings),
+            "messages": self.message_records(),
             "provenance": self._provenance(),
         }
 

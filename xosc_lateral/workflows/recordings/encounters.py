@@ -10,6 +10,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.workflows.recordings.lane_graph import At, RoadLanes
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
+from xosc_lateral.world.motion.nominal import EntityMotion
 
 ENCOUNTER_DISTANCE = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
 BRAKING_DECELERATION = 1.0  # from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
@@ -82,6 +83,28 @@ def _at(plan: VehiclePlan, time: float) -> At | None:
     row, s = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1), _along(plan, np.array([time]))
     way, box = int(vehicle.way(slice(row, row + 1))[0]), vehicle.box
     return At(int(vehicle.road[row]), int(vehicle.lane[row]), way, float(s[0]), box.center_x, box.length)
+
+
+def vehicle_ahead(
+    vehicle: EntityMotion, row: int, vehicles: Sequence[EntityMotion], lanes: RoadLanes
+) -> tuple[float, float]:
+    """Free space to the vehicle ahead in its lane [m], and how fast that gets less [m/s]; NaN: none is near."""
+    time = float(vehicle.time[row])
+    rows = [(one, int(np.searchsorted(one.time, time - 1e-9))) for one in vehicles]
+    there = [(one, k) for one, k in rows if k < len(one.time) and one.time[0] <= time + 1e-9 and one.road[k] >= 0]
+    number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
+    if number is None:
+        return np.nan, np.nan
+    places = [
+        At(int(one.road[k]), int(one.lane[k]), int(one.way(slice(k, k + 1))[0]), float(one.s[k]), one.box.center_x,
+           one.box.length)
+        for one, k in there
+    ]  # fmt: skip
+    ahead, _ = lanes.nearest(places, number)
+    if ahead is None or ahead[1] >= ENCOUNTER_DISTANCE:
+        return np.nan, np.nan
+    other, other_row = there[ahead[0]]
+    return ahead[1], float(vehicle.speed[row] - other.speed[other_row])
 
 
 def _beside(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,13 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, COLUMNS, Maneuvers, fit_maneuvers
 from xosc_lateral.drivers.model.profile import SIDES
-from xosc_lateral.workflows.recordings.encounters import ENCOUNTER_DISTANCE
-from xosc_lateral.workflows.recordings.lane_graph import At, RoadLanes
+from xosc_lateral.workflows.recordings.encounters import vehicle_ahead
+from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 from xosc_lateral.workflows.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.workflows.recordings.recordings import read_recording
 from xosc_lateral.world.motion.nominal import EntityMotion
+from xosc_lateral.world.road.network import RoadNetwork
 
 BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""
@@ -27,10 +28,17 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     """Maneuver profile of a recording; raises `FormatError`, `NotEnoughDataError`."""
     traffic = read_recording(recording, road=road)
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
+    return maneuvers_of(vehicles, vehicles, traffic.network, recording.name)
+
+
+def maneuvers_of(
+    drivers: Iterable[EntityMotion], vehicles: Sequence[EntityMotion], network: RoadNetwork, recording: str
+) -> Maneuvers:
+    """Maneuver profile of some drivers among vehicles in the lanes of a road; raises `NotEnoughDataError`."""
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
-    lanes = RoadLanes(traffic.network)
+    lanes = RoadLanes(network)
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
-    for vehicle in vehicles:
+    for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
         if plan.is_played:
             continue
@@ -50,7 +58,7 @@ def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
     before = {side: np.array(rows) for side, rows in ways.items()}
     return fit_maneuvers(
         columns, np.array(sides), before=before, hours=max(keeping, 1.0) / 3600.0, aborted=aborted // 2,
-        recording=recording.name,
+        recording=recording,
     )  # fmt: skip
 
 
@@ -58,29 +66,11 @@ def _facts(
     vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], lanes: RoadLanes
 ) -> tuple[float, ...]:
     """`COLUMNS` of a lane change."""
-    time = vehicle.time
-    first, last = (min(int(np.searchsorted(time, at)), len(time) - 1) for at in (transition.start, transition.end))
-    speed = float(vehicle.speed[first])
-    gap, closing = np.nan, np.nan
-    rows = [(other, int(np.searchsorted(other.time, time[first]))) for other in vehicles]
-    there = [(other, k) for other, k in rows if k < len(other.time) and other.time[k] - time[first] <= BEFORE_STEP]
-    places = [
-        At(
-            int(one.road[k]),
-            int(one.lane[k]),
-            int(one.way(slice(k, k + 1))[0]),
-            float(one.s[k]),
-            one.box.center_x,
-            one.box.length,
-        )
-        for one, k in there
-    ]
-    ahead, _ = lanes.nearest(places, next(k for k, (one, _) in enumerate(there) if one is vehicle))
-    if ahead is not None and ahead[1] < ENCOUNTER_DISTANCE:
-        other, row = there[ahead[0]]
-        gap, closing = ahead[1], speed - float(other.speed[row])
-    change, width = float(vehicle.speed[last]) - speed, float(vehicle.lane_width[first])
-    return transition.duration, speed, change, width, vehicle.box.length, gap, closing
+    ends = np.searchsorted(vehicle.time, (transition.start, transition.end))
+    first, last = np.minimum(ends, len(vehicle.time) - 1).tolist()
+    speed, width = float(vehicle.speed[first]), float(vehicle.lane_width[first])
+    ahead = vehicle_ahead(vehicle, first, vehicles, lanes)
+    return transition.duration, speed, float(vehicle.speed[last]) - speed, width, vehicle.box.length, *ahead
 
 
 def _way_before(vehicle: EntityMotion, transition: Transition, free: float) -> FloatArray | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note, notes
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.output_paths import claim, output_folder
@@ -58,6 +59,11 @@ class Reconstruction(Result):
         return self.traffic.name
 
     @property
+    def messages(self) -> tuple[Note, ...]:
+        """What the scenario does not say of the recording."""
+        return notes([*self.traffic.notes, *not_expressed(self.plans, self.recording.left_out)])
+
+    @property
     def left_out(self) -> tuple[str, ...]:
         """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
         return self.recording.left_out
@@ -80,7 +86,8 @@ class Reconstruction(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them and the report holds them."""
-        return facts_of(self) | {"outputs": [str(path) for path in self.outputs]}
+        outputs = [str(path) for path in self.outputs]
+        return facts_of(self) | {"outputs": outputs, "messages": self.message_records()}
 
     def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
         """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
@@ -136,7 +143,7 @@ def facts_of(made: Reconstruction) -> dict[str, Any]:
         "encounters": encounter_rows(made.encounters),
         "rows": rows_of(made),
         "inferred": {name: [list(gap) for gap in gaps] for name, gaps in recording.inferred.items()},
-        "not_expressed": [*made.traffic.notes, *not_expressed(plans, recording.left_out)],
+        "not_expressed": list(made.notes),
         "provenance": {"package_version": __version__, "inputs": parsed_hashes(made.files)},
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IndexArray
-from xosc_lateral.base.errors import locate
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.rows import rows_where
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.road.positions import RouteStep
@@ -111,20 +111,6 @@ class PlayedAction:
     end: float | None  # time at which it ended; None: still running at the end of the run [s]
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
-    """Something that was not played, or not as written: never silent."""
-
-    what: str
-    path: str
-    line: int | None
-    element: str | None = None
-
-    def __str__(self) -> str:
-        """One line: file, line, element, what."""
-        return " ".join(locate(self.what, path=self.path, line=self.line, element=self.element).split())
-
-
 class FollowedRoute(NamedTuple):
     """A route that an entity got."""
 
@@ -154,8 +140,12 @@ class NominalMotion(Traffic):
 
     end_time: float  # [s]
     ended_by: str  # ``"stop trigger"`` or ``"time limit"`` or what else ended the run
-    notes: tuple[Note, ...]  # what could not be played as written, and `doubts`
-    doubts: tuple[Note, ...] = ()  # of them, what can hardly be meant
+    notes: tuple[Note, ...]  # what could not be played as written, and, as warnings, what can hardly be meant
     routes: tuple[FollowedRoute, ...] = ()  # in order of time
     cut_off: Note | None = None
     """Says that the time limit came before the scenario's end, or before all its stories were over."""
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """All that is to be said of the run."""
+        return self.notes if self.cut_off is None else (self.cut_off, *self.notes)

@@ -76,13 +76,17 @@ class OffsetPath(Struct, frozen=True, eq=False):
     # start, end: the offset that it is put down with, and that it ends with if all is as in the nominal run [m]
     start: float = 0.0
     end: float = 0.0
+    instead: bool = False  # it leads to another lane, in place of the action `after`
+    # settles: it is led there first, from wherever it is: so far along +t from its lane's centre, within a way [m]
+    settles: tuple[float, float] | None = None
 
 
 def resized(path: OffsetPath, factor: float) -> OffsetPath:
     """With offsets of another size; without any, and nothing to place, with a factor of 0."""
     pieces = (one.resized(factor) for one in path.pieces if factor)
     placed = path.placed_t if path.placed_t is None else path.placed_t - path.side * (1.0 - factor) * path.start
-    return replace(path, pieces=tuple(pieces), placed_t=placed, start=factor * path.start)
+    settles = None if path.settles is None else (factor * path.settles[0], path.settles[1])
+    return replace(path, pieces=tuple(pieces), placed_t=placed, start=factor * path.start, settles=settles)
 
 
 Offset = Callable[[FloatArray], FloatArray]

@@ -181,6 +181,7 @@ class Crossing(Struct, frozen=True, eq=False):
     way: FloatArray  # how far across on these rows, from its begin, positive to the left of travel [m]
     stays: str  # why it keeps the written way; empty: it can have the bell
     is_lane_change: bool
+    path: tuple[str, ...] = ()  # of the action: its names from the story down; empty: of no single one
 
 
 def crossings(motion: NominalMotion, entity: EntityMotion, runs: Sequence[Sequence[SegmentSpan]]) -> Iterator[Crossing]:
@@ -196,7 +197,7 @@ def crossings(motion: NominalMotion, entity: EntityMotion, runs: Sequence[Sequen
                 stays = "another action overrules it, or it does not end" if len(running) != 1 else ""
                 stays = stays or _why_not(entity, run, first, last, way)
                 is_lane_change = any(isinstance(one.action.content, LaneChangeAction) for one in running)
-                yield Crossing(first, last, way, stays, is_lane_change)
+                yield Crossing(first, last, way, stays, is_lane_change, running[0].path if len(running) == 1 else ())
 
 
 def leads_left(entity: EntityMotion, network: RoadNetwork, begin: float, end: float) -> bool:
@@ -211,7 +212,7 @@ def leads_left(entity: EntityMotion, network: RoadNetwork, begin: float, end: fl
 
 def beside_written(entity: EntityMotion, crossing: Crossing) -> tuple[slice, FloatArray]:
     """Rows on which the bell is beside the written way, and by how much, positive left. [m]"""
-    begin, duration = _bell_time(entity, crossing)
+    begin, duration = bell_time(entity, crossing)
     rows = slice(*np.searchsorted(entity.time, (begin, begin + duration)))
     rows = slice(min(rows.start, crossing.first), max(rows.stop, crossing.last + 1))
     done = bell_share(np.clip((entity.time[rows] - begin) / duration, 0.0, 1.0))
@@ -238,7 +239,7 @@ def _way(entity: EntityMotion, first: int, last: int) -> FloatArray:
     return np.concatenate(([0.0], np.cumsum(steps)))
 
 
-def _bell_time(entity: EntityMotion, crossing: Crossing) -> tuple[float, float]:
+def bell_time(entity: EntityMotion, crossing: Crossing) -> tuple[float, float]:
     """Begin and duration of the bell that is at a tenth and at nine tenths of the way when the written shape is. [s]"""
     share = np.maximum.accumulate(crossing.way / crossing.way[-1])
     tenth, nine_tenths = np.interp((0.1, 0.9), share, entity.time[crossing.first : crossing.last + 1])
@@ -252,7 +253,7 @@ def _why_not(entity: EntityMotion, run: Sequence[SegmentSpan], first: int, last:
         return f"it takes {taken:.1f} s, the bell is for {SHORTEST_DURATION:g} to {LONGEST_DURATION:g} s"
     if abs(way[-1]) < 1e-3 or np.max(np.abs(way)) > 1.001 * abs(way[-1]):
         return "it leads nowhere, or beyond its end"
-    begin, duration = _bell_time(entity, Crossing(first, last, way, "", False))
+    begin, duration = bell_time(entity, Crossing(first, last, way, "", False))
     before, behind = run[0].first, run[-1].last
     starts_there = before == 0 or bool(entity.activity[before] & Activity.TELEPORTED)
     if (begin < entity.time[before] and not starts_there) or (

@@ -16,8 +16,9 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.memory import free_bytes
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.rows import BLOCK, columns
-from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
+from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion
 from xosc_lateral.world.player.drive import align_trailers, connect, drive, halt_at_road_end, pull_trailers
 from xosc_lateral.world.player.recorder import NO_LANE
 from xosc_lateral.world.player.simulation import Simulation
@@ -102,7 +103,7 @@ class _Player:
         place, cut_off = simulation.scenario.storyboard.place, None
         goes_on = any(story.state is not StoryboardElementState.COMPLETE for story in self.root.children)
         if going and (_has_end(simulation.scenario) or goes_on):
-            cut_off = Note(f"{CUT_OFF} of {time_limit:g} s", place.path, place.line, place.element)
+            cut_off = place.note(f"{CUT_OFF} of {time_limit:g} s", is_warning=True)
         return self._result(ended_by, cut_off)
 
     def _begin(self) -> bool:
@@ -233,7 +234,6 @@ class _Player:
             end_time=float(time[-1]),
             ended_by=ended_by,
             notes=tuple(simulation.notes),
-            doubts=tuple(simulation.doubts),
             routes=tuple(simulation.routes),
             cut_off=cut_off,
         )

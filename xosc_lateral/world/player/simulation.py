@@ -12,7 +12,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.world.motion.nominal import FollowedRoute, Note, PlayedAction
+from xosc_lateral.base.note import Note
+from xosc_lateral.world.motion.nominal import FollowedRoute, PlayedAction
 from xosc_lateral.world.player.drive import along_reference, beside_line
 from xosc_lateral.world.player.recorder import MAXIMUM_COORDINATE, MAXIMUM_SPEED, Rows
 from xosc_lateral.world.player.state import ACTIVE, EntityState
@@ -138,14 +139,11 @@ class Simulation:
         self.derives_off_road = False
         self.when_built: list[Callable[[Any], None]] = []
         """Called with all elements, by `last_name`, once the storyboard stands: conditions on them look for theirs."""
-        self.notes: list[Note] = []
-        self.doubts: list[Note] = []
+        self.notes: list[Note] = list(scenario.notes)
         self.routes: list[FollowedRoute] = []
-        self._noted: set[tuple[str, str, int | None]] = set()
+        self._noted = {(note.what, note.path, note.line) for note in self.notes}
         self.played: list[PlayedAction] = []
         """All actions started so far, in order of start."""
-        for remark in scenario.remarks:
-            self.note(remark.reason or "is not read", remark.place)
 
     def entity(self, name: str, place: Place) -> EntityState:
         """The entity of that name, to be looked at now or later; raises `PlaybackError` at `place` if there is none."""
@@ -174,8 +172,7 @@ class Simulation:
         key = (what, place.path, place.line)
         if key not in self._noted:
             self._noted.add(key)
-            self.notes.append(Note(what, place.path, place.line, place.element))
-            self.doubts += self.notes[-1:] if is_doubt else []
+            self.notes.append(place.note(what, is_warning=is_doubt))
 
     def values_of(self, content: object) -> tuple[Values, str]:
         """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.note import Note
 from xosc_lateral.world.road.index import LANE_TOLERANCE, SurfaceIndex
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.positions import LaneCoordinates, LaneInfo, LaneState, Pose, RoadMark
@@ -34,7 +35,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         *,
         junctions: tuple[Junction, ...] = (),
         path: str = "",
-        notes: tuple[str, ...] = (),
+        notes: tuple[Note, ...] = (),
         geo_reference: str | None = None,
         sha256: str = "",
         header_offset: HeaderOffset | None = None,

@@ -8,6 +8,7 @@ from typing import Annotated
 from msgspec import UNSET, Struct
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,10 @@ class Place:
     def error(self, what: str, kind: type[FormatError] = FormatError) -> FormatError:
         """An error that names the place."""
         return kind(what, path=self.path, line=self.line, element=self.element)
+
+    def note(self, what: str, *, is_warning: bool = False, entity: str | None = None) -> Note:
+        """A note that names the place."""
+        return Note(what, self.path, self.line, self.element, is_warning, entity)
 
 
 class Content(Struct, frozen=True, kw_only=True):

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from msgspec import Struct
 
+from xosc_lateral.base.note import Note
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import ConditionEdge, ParameterType, Priority, TriggeringEntitiesRule
 from xosc_lateral.world.scenario.place import Content, EntityRefs, Name, No, Place, Unsupported, Xml, Zero, called
@@ -76,7 +77,7 @@ class Scenario:
     entities: tuple[Entity, ...]
     """In file order; a trailer described inside its tractor follows it as an entity of its own."""
     storyboard: Storyboard
-    remarks: tuple[Unsupported, ...] = ()
+    notes: tuple[Note, ...] = ()
     """What was read over because motion does not depend on it, or is replaced (a controller whose catalog is
     missing)."""
     input_hashes: Mapping[Path, str] = field(default_factory=dict)

@@ -11,6 +11,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError, PlaybackError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.provenance import refuse_converted
 from xosc_lateral.files.openscenario.references import final, parameter_name
@@ -19,7 +20,6 @@ from xosc_lateral.files.openscenario.write.build import Version, Vertices, versi
 from xosc_lateral.files.xml import parse_xml, read_document
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario.parameters import Scope
-from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.scenario import Action, Scenario
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3), (1, 4))
@@ -85,10 +85,8 @@ class Draft:
         self.scope = Scope({name: final(parameter.value) for name, parameter in scenario.parameters.items()})
         """The values that the scenario was played with."""
         self.vertices = Vertices(scenario.source)
-        self.removed: list[Unsupported] = []
-        """Controllers and actions that are no longer in the output although they are no motion, with reasons."""
-        self.notes: list[str] = []
-        """What else there is to say of the output, a line each."""
+        self.notes: list[Note] = []
+        """What there is to say of the output: what is no longer in it although it is no motion, say."""
 
     @property
     def init_actions(self) -> etree._Element:
@@ -141,7 +139,5 @@ class WrittenScenario:
     sha256: str  # of the file's bytes
     content_sha256: str  # of the file without its provenance
     converted: tuple[str, ...]  # entities that move otherwise than in the input
-    removed: tuple[Unsupported, ...]
-    """Controllers and actions that are no longer in the file although they are no motion, with reasons."""
     data: bytes  # the file's bytes; empty if they were written
-    notes: tuple[str, ...] = ()  # what the version or the player that it was made for lacks, a line each
+    notes: tuple[Note, ...] = ()  # what is left out, or not as it was

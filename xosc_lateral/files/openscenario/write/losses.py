@@ -9,6 +9,7 @@ from typing import NoReturn
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.note import Note
 from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.xml import line_of
@@ -37,12 +38,13 @@ class Losses:
     target: str  # what lacks things, as in ``version 1.0``
     # reactive: maneuvers and conditions still decide on what happens: those can't be taken out, and events stay
     reactive: bool
-    notes: list[str] = field(default_factory=list)  # a line each, in order, once
+    notes: list[Note] = field(default_factory=list)  # in order, once
 
     def note(self, text: str) -> None:
         """Say something once."""
-        if text not in self.notes:
-            self.notes.append(text)
+        note = Note(text, is_warning=True)
+        if note not in self.notes:
+            self.notes.append(note)
 
     def refuse(self, element: etree._Element, what: str, hint: str = "; use --mode trajectory") -> NoReturn:
         """`FormatError` for what can't be done without."""

@@ -16,9 +16,10 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.limits import REPEATED_RUNS
+from xosc_lateral.base.note import warnings
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
-from xosc_lateral.files.openscenario.write.draft import Draft
+from xosc_lateral.files.openscenario.write.draft import Draft, source_of
 from xosc_lateral.files.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.files.openscenario.write.moving import moving_entities
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import ReplacedManeuvers
@@ -27,7 +28,7 @@ from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, driven_from_the_start, gives
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
-from xosc_lateral.world.scenario.private_actions import LATERAL, TeleportAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, FollowTrajectoryAction, TeleportAction
 from xosc_lateral.world.scenario.scenario import Scenario
 
 PATH_NAME = "xosc-lateral offsets"
@@ -54,8 +55,12 @@ def add_paths(
     moving = moving_entities(draft, trajectories)
     maneuvers = ReplacedManeuvers(draft, moving)
     story = build.story("xosc-lateral")
+    across = [(path, _element_of(path, draft)) for path in paths if path.instead]
+    for number, (path, change) in enumerate(across, start=1):
+        _lead_across(change, f"{PATH_NAME} across {number}", path, draft)
     for path in paths:
-        _add_acts(story, path, draft, lateral)
+        if not path.instead:
+            _add_acts(story, path, draft, lateral)
     _place_aside(draft, paths)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
@@ -67,6 +72,26 @@ def add_paths(
     inline_maneuvers(draft, referred)
     maneuvers.replace()
     return tuple(dict.fromkeys([*moving, *(path.entity for path in paths)]))
+
+
+def _element_of(path: OffsetPath, draft: Draft) -> etree._Element:
+    """The lane change that a path leads across in place of, in the tree before anything in it is changed."""
+    actions = ((at.path, action) for at in draft.scenario.storyboard.events() for action in at.event.actions)
+    action = next(action for names, action in actions if (*names, action.name) == path.after)
+    return next(source_of(action, draft.scenario, draft.root).iter("{*}LaneChangeAction"))
+
+
+def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
+    """Event, action and trigger stay; the player moves it along the path."""
+    lateral = change.getparent()
+    assert lateral is not None
+    private = lateral.getparent()
+    assert private is not None
+    routing = etree.Element("RoutingAction")
+    _follow(build.sub(routing, "FollowTrajectoryAction"), name, path, path.pieces[0], draft)
+    place = private.index(lateral)
+    private.remove(lateral)
+    build.insert_indented(private, place, routing)
 
 
 def _place_aside(draft: Draft, paths: Sequence[OffsetPath]) -> None:
@@ -96,38 +121,59 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
         runs = sum(one.path == path.after and one.actor == path.entity for one in draft.motion.actions)
         if runs > REPEATED_RUNS.value:
             what = f"{' / '.join(begun_by.path)}: {REPEATED_RUNS.refusal(runs)}"
-            draft.notes.append(f"'{path.entity}' has no offsets after more of them; {what}")
+            draft.notes += warnings([f"'{path.entity}' has no offsets after more of them; {what}"], entity=path.entity)
         count = min(runs, int(REPEATED_RUNS.value)) + SPARE_ACTS
     for _ in range(count):
         act = build.sub(story, "Act", name=f"{PATH_NAME} {len(story) + 1}")
         name = str(act.get("name"))
-        _add_pieces(act, name, path, draft)
+        _add_pieces(act, name, path, draft, is_turned=begun_by is not None and begun_by.turns)
         _add_start(act, path, begun_by, before, draft.version)
         _add_stop(act, name, path, [one for one in actions if one is not begun_by or one.repeats])
         before = name
 
 
-def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
+def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft, *, is_turned: bool) -> None:
     """A trajectory each: the reference player finds the places of vertices when it starts, so it may run once."""
     maneuver, begins = build.maneuver(act, f"{name} path", path.entity), ("act", name, "runningState")
-    for number, piece in enumerate(path.pieces, start=1):
-        event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, draft.version)
-        action = build.private_action(event, f"{name}.{number} action")
-        follow = build.sub(action, "RoutingAction/FollowTrajectoryAction")
-        holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
-        polyline = build.sub(build.sub(holder, "Trajectory", name=f"{name}.{number}", closed="false"), "Shape/Polyline")
-        draft.vertices.add(polyline, _vertices(path, piece))
-        build.sub(follow, "TimeReference/None")
-        build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
-        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
-        build.state_condition(build.sub(event, "StartTrigger/ConditionGroup"), *begins, wait)
+
+    def event(number: int, wait: float) -> etree._Element:
+        nonlocal begins
+        added = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, draft.version)
+        action = build.private_action(added, f"{name}.{number} action")
+        build.state_condition(build.sub(added, "StartTrigger/ConditionGroup"), *begins, wait)
         begins = "event", f"{name}.{number}", "completeState"
+        return action
+
+    if path.settles is not None:
+        _settle(event(0, FIRST_WAIT), path, *path.settles)
+    for number, piece in enumerate(path.pieces, start=1):
+        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
+        follow = build.sub(event(number, wait), "RoutingAction/FollowTrajectoryAction")
+        keeps_heading = number == 1 and is_turned and path.settles is None
+        _follow(follow, f"{name}.{number}", draft, _vertices(path, piece, keeps_heading=keeps_heading))
 
 
-def _vertices(path: OffsetPath, piece: PathPiece | Bridge) -> build.FreeVertices:
+def _settle(action: etree._Element, path: OffsetPath, aside: float, within: float) -> None:
+    """From wherever it is to a place in its lane, by the distance driven."""
+    change = build.sub(action, "LateralAction/LaneChangeAction", targetLaneOffset=build.decimal(aside, 4))
+    dynamics = {"dynamicsShape": "sinusoidal", "dynamicsDimension": "distance", "value": build.decimal(within, 1)}
+    build.sub(change, "LaneChangeActionDynamics", **dynamics)
+    build.sub(change, "LaneChangeTarget/RelativeTargetLane", entityRef=path.entity, value="0")
+
+
+def _follow(follow: etree._Element, name: str, draft: Draft, vertices: build.FreeVertices) -> None:
+    """Along a path, without times."""
+    holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
+    polyline = build.sub(build.sub(holder, "Trajectory", name=name, closed="false"), "Shape/Polyline")
+    draft.vertices.add(polyline, vertices)
+    build.sub(follow, "TimeReference/None")
+    build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
+
+
+def _vertices(path: OffsetPath, piece: PathPiece | Bridge, *, keeps_heading: bool) -> build.FreeVertices:
     if isinstance(piece, Bridge):
-        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside)
-    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)))
+        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside, keeps_heading)
+    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)), keeps_heading)
 
 
 def _add_start(
@@ -193,6 +239,7 @@ class LateralAction(Struct, frozen=True):
     repeats: bool = False  # it may run more than once
     adds: bool = False  # it adds the entity
     steers: bool | None = None  # it gives the entity to a controller; False: it takes it back
+    turns: bool = False  # it may leave the entity turned against its lane: a trajectory, or what is ended half-way
 
 
 class LateralActions(Struct, frozen=True):
@@ -210,6 +257,8 @@ class LateralActions(Struct, frozen=True):
         by_entity: dict[str, dict[LateralAction, None]] = {}
         for at in scenario.storyboard.events():
             repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
+            others = (one for maneuver, one in at.group.events() if maneuver.name == at.path[3] and one is not at.event)
+            is_cut = at.act.stop_trigger is not None or any(one.priority is Priority.OVERRIDE for one in others)
             for action in at.event.actions:
                 content, path = action.content, (*at.path, action.name)
                 reference = _reference(path, len(at.event.actions) == 1, names)
@@ -217,7 +266,8 @@ class LateralActions(Struct, frozen=True):
                 for actor in (content.entity_ref,) if isinstance(content, AddEntityAction) else at.actors:
                     steers = gives(content, controls[actor]) if actor in controls else None
                     if adds or steers is not None or isinstance(content, (*LATERAL, TeleportAction)):
-                        lateral = LateralAction(path, *reference, repeats, adds, steers)
+                        turns = isinstance(content, FollowTrajectoryAction) or (is_cut and isinstance(content, LATERAL))
+                        lateral = LateralAction(path, *reference, repeats, adds, steers, turns)
                         by_entity.setdefault(actor, {})[lateral] = None
         actions = {entity: tuple(found) for entity, found in by_entity.items()}
         return cls(actions, controls, driven_from_the_start(scenario))

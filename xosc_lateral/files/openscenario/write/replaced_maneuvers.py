@@ -13,6 +13,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import locate
+from xosc_lateral.base.note import warnings
 from xosc_lateral.files.openscenario.element import at_node, child_of
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.draft import Draft
@@ -168,8 +169,7 @@ class ReplacedManeuvers:
         actions = self._draft.motion.actions
         theirs = (one for one in actions if one.path[:3] in self._gone or one.actor in self._moving)
         kept = kept_actions(self._draft, theirs, self._moving)
-        notes = [note for note in map(self._freeze, self._frozen) if note]
-        self._draft.notes += dict.fromkeys(notes)
+        self._draft.notes += warnings(dict.fromkeys(filter(None, map(self._freeze, self._frozen))))
         rewrite_init(self._draft, {name: item.start for name, item in self._moving.items()})
         self._take_out()
         self._put_in(kept)

@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from lxml import etree
 
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.element import at_node, child_of, children_of, elements, local_name
 from xosc_lateral.files.openscenario.references import NAMES, final
@@ -24,7 +25,6 @@ from xosc_lateral.world.scenario.controllers import assigned_controllers, contro
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction, ParameterModifyAction, ParameterSetAction
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
-from xosc_lateral.world.scenario.place import Place, Unsupported
 from xosc_lateral.world.scenario.private_actions import CONTROLLER, MOTION, ConnectTrailerAction
 from xosc_lateral.world.scenario.scenario import Scenario, conditions_of
 
@@ -41,8 +41,8 @@ def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
         if control := driving.get(entity.name):
             what = f"{control}; now as the default driver would"
         if control or assigned[entity.name]:
-            reason = f"'{entity.name}' follows a trajectory: controller {what}"
-            draft.removed.append(Unsupported("ObjectController", entity.place, reason))
+            reason = f"ObjectController left out ('{entity.name}' follows a trajectory: controller {what})"
+            draft.notes.append(entity.place.note(reason, is_warning=True, entity=entity.name))
         item = at_node(draft.root, entity.place.node)
         if entity.controllers and local_name(item) == "ScenarioObject":  # else described in a catalog
             for owner in item.findall("{*}ObjectController"):
@@ -100,18 +100,18 @@ def _prune(element: etree._Element) -> None:
 def kept_actions(draft: Draft, played: Iterable[PlayedAction], moving: Collection[str]) -> list[PlayedAction]:
     """Those of events that no trajectory stands for, in the order of the run; those that can't be kept are named."""
     kept: list[PlayedAction] = []
-    dropped: dict[tuple[Place, str | None], Unsupported] = {}
+    dropped: dict[Note, None] = {}
     for item in played:
         content, place = item.action.content, item.action.place
         if item.path == ("Init",):
             continue
         is_set = isinstance(content, ParameterSetAction | ParameterModifyAction)
         if is_set and content.parameter_ref not in draft.scenario.parameters:
-            reason = f"sets parameter '{content.parameter_ref}' of a story that is no longer there"
-            dropped[place, item.actor] = Unsupported(type(content).__name__, place, reason)
+            reason = f"left out (sets parameter '{content.parameter_ref}' of a story that is no longer there)"
+            dropped[place.note(reason, is_warning=True, entity=item.actor)] = None
         elif item.actor not in moving or not isinstance(content, MOTION + CONTROLLER):
             kept.append(item)
-    draft.removed += dropped.values()
+    draft.notes += dropped
     return kept
 
 

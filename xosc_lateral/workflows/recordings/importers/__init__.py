@@ -22,6 +22,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TIME, Range, context_range
+from xosc_lateral.base.note import Note, notes
 from xosc_lateral.base.plugins import plugins
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
@@ -145,6 +146,11 @@ class ImportedDrives(Result):
     provenance: ImportRecord
     sources: tuple[Path, ...] = ()
 
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """What its record says besides numbers."""
+        return notes(self.provenance.notes)
+
     def headline(self) -> str:
         """One line."""
         known = self.provenance
@@ -155,8 +161,7 @@ class ImportedDrives(Result):
         rows = ", ".join(f"{count} {state}" for state, count in record.rows.items())
         head = f"{record.source}: {record.vehicles} vehicles, {record.hours:g} h kept (rows: {rows})"
         lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in record.lanes]
-        notes = [f"  note: {note}" for note in record.notes]
-        return "\n".join([head, *lanes, *notes, f"licence: {record.licence}"])
+        return "\n".join([head, *lanes, *self.message_lines(), f"licence: {record.licence}"])
 
     def to_frame(self) -> pd.DataFrame:
         """The drive table: what `fit` and the other calls take."""
@@ -164,14 +169,14 @@ class ImportedDrives(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: the provenance."""
-        return asdict(self.provenance)
+        return asdict(self.provenance) | {"messages": self.message_records()}
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance, whole or not at all."""
         output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
         claim([output], [source for source in self.sources if source.is_file()], force=force)
         text = lambda: harmless_frame(self.table).to_csv(index=False, lineterminator="\n")  # noqa: E731
-        write_table(output, self.to_dict(), frame=lambda: self.table, text=text)
+        write_table(output, asdict(self.provenance), frame=lambda: self.table, text=text)
         return output
 
 

@@ -1,0 +1,101 @@
+"""Lane changes of vehicles that react, led across as drivers take them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+from msgspec import structs
+from scipy.stats import beta
+
+import xosc_lateral as xl
+from tests.world.motion.test_crossings import WIDTH, scenario
+from tests.world.scenario.test_under_test import headway, state
+from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.conversion.meaning import with_speeds
+from xosc_lateral.world.motion.segments import ALPHA, BETA
+from xosc_lateral.world.player.player import play
+
+REAL = os.environ.get("ESMINI_LIBRARY")
+TRIGGER = headway("Ego", "A").replace('value="1"', 'value="0.9"')
+OVER = (
+    '<ConditionGroup><Condition name="over" delay="9" conditionEdge="none">'
+    f"{state('change', 'completeState')}</Condition></ConditionGroup>"
+)
+XSD = Path(__file__).resolve().parents[2] / "data/xsd"
+
+
+def test_a_car_that_an_ego_calls_takes_the_way_of_drivers(tmp_path: Path) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    (begin,) = (one.start for one in play_scenario(path).motion.actions if "change" in one.path)
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    assert made.modes == {"A": "lane-offset"} and not made.warnings
+    played = play_scenario(tmp_path / "out.xosc")
+    (action,) = (one for one in played.motion.actions if "change" in one.path)
+    # a sinusoid of 5 s is at a tenth and at nine tenths of its way when the bell is
+    tenths, bell = 5.0 / np.pi * np.arccos([0.8, -0.8]), beta(ALPHA, BETA)
+    duration = np.ptp(tenths) / np.ptp(bell.ppf([0.1, 0.9]))
+    over = tenths[0] + duration * (1.0 - bell.ppf(0.1))
+    assert action.start == pytest.approx(begin, abs=0.05) and begin > 3.0
+    assert action.end - action.start == pytest.approx(over, abs=0.05)
+    car = next(one for one in played.motion.entities if one.name == "A")
+    right = -car.offset + WIDTH * (car.lane[0] - car.lane)
+    rows = (car.time > begin) & (car.time < begin + over)
+    done = bell.cdf((car.time[rows] - begin - tenths[0]) / duration + bell.ppf(0.1))
+    beside = right[rows] - right[rows][0] - WIDTH * done  # what moves the driver in his lane goes on
+    assert 0.02 < np.ptp(beside) < 0.6
+    assert np.abs(np.diff(beside)).max() < 0.3 * played.motion.step  # [m]: 0.3 m/s
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.2])
+def test_whenever_the_ego_calls_it_ends_in_the_same_lane_and_moves_on_about_its_middle(
+    tmp_path: Path, factor: float
+) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    played = play_scenario(tmp_path / "out.xosc")
+    endless = replace(played.scenario, storyboard=structs.replace(played.scenario.storyboard, stop_trigger=None))
+    motion = play(with_speeds(endless, played.motion, ["Ego"], ((1.0, factor, 3.0),)), played.network, time_limit=40.0)
+    car = next(one for one in motion.entities if one.name == "A")
+    assert car.lane[-1] == -2
+    behind = car.time > car.time[np.argmax(car.lane == -2)] + 8.0
+    assert np.abs(car.offset[behind]).max() < 0.8 and np.ptp(car.offset[behind]) > 0.02
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.2"])
+def test_the_output_is_valid_and_keeps_event_and_trigger(tmp_path: Path, version: str) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike", version=version)
+    root = etree.parse(str(tmp_path / "out.xosc"))
+    etree.XMLSchema(etree.parse(str(XSD / f"OpenSCENARIO-{version}.0.xsd"))).assertValid(root)
+    (event,) = root.iterfind(".//Event[@name='change']")
+    assert event.find(".//FollowTrajectoryAction") is not None and event.find(".//LaneChangeAction") is None
+    assert event.find("StartTrigger//TimeHeadwayCondition") is not None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>', "that of 'Ego'"),
+        ("<StopTrigger>", f"<StopTrigger>{OVER}", "'over' waits for its end"),
+    ],
+)
+def test_what_is_not_known_before_stays_as_written_and_is_named(tmp_path: Path, old: str, new: str, why: str) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    assert [line for line in made.warnings if "of 'A' at" in line and "stays as written" in line and why in line]
+    assert "<LaneChangeAction>" in (tmp_path / "out.xosc").read_text()
+
+
+@pytest.mark.skipif(not REAL, reason="ESMINI_LIBRARY names no library of esmini")
+def test_esmini_plays_it_as_the_source(tmp_path: Path) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike", player_library=REAL)
+    assert "RoutingAction" in (tmp_path / "out.xosc").read_text() and not made.warnings
