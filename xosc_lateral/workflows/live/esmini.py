@@ -182,7 +182,7 @@ class EsminiTraffic:
             # once more when the action is over: from there on the driver leads over
             if (rest := known.rest) is not None and (rest.gap or abs(state.speed) > AT_REST):
                 rest.passed += dt * pace
-                left = left_of_gap(np.array([rest.passed / rest.over]), rest.over, rest.gap, rest.rate)
+                left = left_of_gap(*np.array([[rest.passed / rest.over], [rest.over], [rest.gap], [rest.rate]]))
                 room = self._ledger.room_to_middle(state)
                 rest.way = float(left[0] * smooth_step(np.array([min(max(room / MIDDLE, 0.0), 1.0)]))[0])
                 if room > 0.0 and rest.way:

@@ -88,7 +88,9 @@ def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Dra
     private = lateral.getparent()
     assert private is not None
     routing = etree.Element("RoutingAction")
-    _follow(build.sub(routing, "FollowTrajectoryAction"), name, path, path.pieces[0], draft)
+    _follow(
+        build.sub(routing, "FollowTrajectoryAction"), name, draft, _vertices(path, path.pieces[0], keeps_heading=False)
+    )
     place = private.index(lateral)
     private.remove(lateral)
     build.insert_indented(private, place, routing)
