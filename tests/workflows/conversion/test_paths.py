@@ -21,8 +21,9 @@ from tests.kit.scenario_files import (
     time_condition,
     write_scenario,
 )
+from tests.kit.stage import follow, polyline
 from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
-from tests.world.scenario.test_under_test import event, headway, stories
+from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.conversion.meaning import with_speeds
 from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
@@ -139,3 +140,18 @@ def test_a_path_turns_a_car_that_a_stopped_lane_change_leaves_turned_by_and_by(t
     source, car = _car(tmp_path / "scenario.xosc"), _car(tmp_path / "out.xosc")
     assert abs(np.sin(source.heading_relative[-1])) > 0.02 > 0.01 > abs(np.sin(car.heading_relative[-1]))
     assert np.abs(np.diff(np.unwrap(car.heading))).max() < 0.008  # in 0.02 s
+
+
+def test_an_offset_is_led_out_before_a_trajectory_that_starts_without_it(tmp_path: Path) -> None:
+    way = polyline(*((0.0, f'<LanePosition roadId="1" laneId="-1" s="{s}"/>') for s in range(400, 701, 20)))
+    init = private("Ego", teleport("20"), speed_action("20")) + private("A", teleport("100"), speed_action("25"))
+    brake, trajectory = event("late", headway("Ego", "A"), speed_action("20")), event("way", at(12.0), follow(way))
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"), init=init,
+        stories=stories(("A", brake), ("A", trajectory)), stop=time_condition(20),
+    )  # fmt: skip
+    made = xl.convert(write_scenario(tmp_path, text), tmp_path / "out.xosc", seed=1)
+    assert made.modes == {"A": "lane-offset"}
+    car = _car(tmp_path / "out.xosc", "A")
+    assert np.abs(car.offset[car.time < 4.0]).max() > 0.05
+    assert np.abs(np.diff(car.offset)).max() < 0.01 and np.abs(car.offset[car.time > 12.1]).max() < 1e-6

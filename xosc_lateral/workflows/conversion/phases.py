@@ -47,6 +47,7 @@ from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
     AcquirePositionAction,
     AssignRouteAction,
+    FollowTrajectoryAction,
     LaneChangeAction,
 )
 
@@ -238,13 +239,17 @@ class _Phases:
         end = float(way.distance[-1]) if ahead is None else ahead.distance - END_MARGIN
         if end - begin < LEAST_LENGTH:
             return None
-        actions = {one.path: self._driven_at(one.start) for one in self._own if one.path in self._lateral}
+        own = [one for one in self._own if one.path in self._lateral]
+        actions = {one.path: self._driven_at(one.start) for one in own}
         foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
         cut = min(foreseen, default=np.inf) if is_known else np.inf
+        trajectories = (one.path for one in own if isinstance(one.action.content, FollowTrajectoryAction))
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
         offset: Offset = self._foreseeing if is_known else self._offset
         if start is not None:
             offset = approached(offset, begin, start, APPROACH_TIME * self._speed_at(begin))
+            if cut in cuts and any(actions[path] == cut for path in trajectories):  # which starts without an offset
+                offset = approached(offset, cut, 0.0, -APPROACH_TIME * self._speed_at(cut))
         pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))
         is_followed = ahead is not None and ahead.lanes and ahead.why != LANE_ENDS and start is not None
         if ahead is not None and is_followed and not any(begin < at < ahead.behind for at in actions.values()):

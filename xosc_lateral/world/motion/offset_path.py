@@ -114,9 +114,11 @@ def spacing_of(distance: FloatArray, speed: FloatArray, curvature: FloatArray) -
 
 
 def approached(offset: Offset, begin: float, start: float, approach: float) -> Offset:
-    """Offsets from a distance on, led to from where the entity is then, within a length. [m]"""
+    """Offsets from a distance on, led to from where the entity is then, within a length; below 0: up to one, led from
+    to where the entity is to be. [m]
+    """
     away = float(offset(np.array([begin]))[0]) - start
-    length = max(approach, SETTLING_LENGTH)
+    length = np.copysign(max(abs(approach), SETTLING_LENGTH), approach)
     return lambda at: offset(at) - away * (1.0 - smoother_step((at - begin) / length))
 
 
