@@ -24,8 +24,8 @@ from tests.kit.scenario_files import (
 from tests.kit.stage import follow, polyline
 from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
+from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.conversion.meaning import with_speeds
 from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.motion.way import way_of
@@ -66,6 +66,16 @@ def test_a_car_moves_through_a_turn_and_takes_it(turning: Path, tmp_path: Path) 
     assert away.max() < 1.0 and np.abs(np.diff(away)).max() < 0.02
     turned = np.abs(np.angle(np.exp(1j * (car.heading - source.heading))))
     assert turned.max() < 0.04
+
+
+def test_an_ego_of_the_check_stops_so_that_others_would_stand_at_a_joint(turning: Path) -> None:
+    motion = play_scenario(turning).motion
+    car = next(one for one in motion.entities if one.name == "T")
+    joints = car.time[1:][np.diff(car.road) != 0]
+    _, slow, fast, ((braking, to, _), (later, *_)) = drives(motion, ["Ego"])
+    assert (slow[0][1], fast[0][1], to) == (0.7, 1.3, 0.0) and later > braking + 18.0 / BRAKING_RATE
+    assert np.abs(joints - braking - 0.5 * 18.0 / BRAKING_RATE).min() < 1e-9
+    assert drives(motion, []) == ((),)
 
 
 def test_a_way_ends_where_s_turns_round_and_goes_on_behind() -> None:

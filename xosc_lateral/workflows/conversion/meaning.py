@@ -19,6 +19,7 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
+from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, EventShift, untouched
@@ -31,34 +32,14 @@ from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
     ConditionEdge,
-    DynamicsDimension,
-    DynamicsShape,
-    Priority,
     StoryboardElementState,
     StoryboardElementType,
 )
-from xosc_lateral.world.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
 from xosc_lateral.world.scenario.scenario import (
-    Act,
-    Action,
-    Actors,
     Condition,
     ConditionGroup,
-    Event,
-    Maneuver,
-    ManeuverGroup,
     Scenario,
-    Story,
 )
-
-CHANGE_START = 1.0
-"""When an ego begins to drive faster or slower than in the nominal run. [s]"""
-BRAKING_START = 5.0
-"""When one begins to brake to a stop. [s]"""
-STANDING_TIME = 2.0
-"""For which it stands. [s]"""
-CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
-"""How fast they do so. [m/s2]"""
 
 LONGER = 1.3
 """Times the longest of these runs, for which offsets last: some egos come to a place later still. [-]"""
@@ -71,7 +52,6 @@ OTHER_FRAMES = (0.9, 2.5)
 AFTERMATH_TIME = 2.0
 """After the last event of all, such a run is over: the last lane is reached, contacts have come about. [s]"""
 
-STORY = "xosc-lateral ego"
 CHANGES = "with offsets, what happens would happen otherwise"
 
 LONGEST_RUN = 3.0
@@ -94,22 +74,6 @@ Output = TypeVar("Output")
 Sizes = dict[int, float]
 """By the number of a path, where it is driven otherwise than sampled."""
 
-Speeds = tuple[tuple[float, float, float], ...]
-"""Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
-
-
-OTHER_RUNS = ("ego at 0.7 times its speed", "ego at 1.3 times its speed", "ego that brakes to a stop")  # of `_drives`
-
-
-def _drives(speed: float) -> tuple[Speeds, ...]:
-    """Ways to drive, beside the nominal one: slower, faster, to a stop and on."""
-    stopped = BRAKING_START + speed / BRAKING_RATE + STANDING_TIME
-    return (
-        ((CHANGE_START, 0.7, CHANGE_RATE),),
-        ((CHANGE_START, 1.3, CHANGE_RATE),),
-        ((BRAKING_START, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE)),
-    )
-
 
 class Meaning:
     """What happens in a source, nominally and under other egos; `egos`: vehicles under test; `time_limit` [s]."""
@@ -121,8 +85,7 @@ class Meaning:
         last = max((one.start if one.end is None else one.end for one in motion.actions), default=0.0)
         until = last if self._is_cut_off else motion.end_time
         self.limit = min(inf if time_limit is None else time_limit, LONGEST_RUN * max(until, LEAST_DURATION))
-        initial = [float(one.speed[0]) for one in motion.entities if one.name in egos]
-        self._drives = ((), *(_drives(max(initial, default=0.0)) if egos else ()))
+        self._drives = drives(motion, egos)
         self._order = list(range(len(self._drives)))  # in which an output's runs are played
         self._before = [self._run(played.scenario, k) for k in self._order]
         self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
@@ -213,27 +176,6 @@ def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
     over = (Condition("over", AFTERMATH_TIME, ConditionEdge.NONE, content, None, place) for content in contents)
     trigger = structs.replace(stop, groups=(*stop.groups, ConditionGroup(tuple(over))))
     return replace(scenario, storyboard=structs.replace(storyboard, stop_trigger=trigger))
-
-
-def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str], speeds: Speeds) -> Scenario:
-    """A scenario in which vehicles under test change their speed."""
-    place = scenario.storyboard.place
-    groups = []
-    for entity in motion.entities:
-        if entity.name in egos:
-            events = []
-            for moment, factor, rate in speeds:
-                name = f"{STORY} {entity.name} at {moment:g} s"
-                dynamics = TransitionDynamics(DynamicsShape.LINEAR, DynamicsDimension.RATE, rate)
-                target = AbsoluteTargetSpeed(factor * float(entity.speed[0]))
-                action = Action(name, SpeedAction(target, dynamics, place=place), place, True)
-                events.append(Event(name, Priority.OVERRIDE, (action,), at_time(moment, STORY, place), place))
-            name = f"{STORY} {entity.name}"
-            actors = Actors((entity.name,), False, place)
-            groups.append(ManeuverGroup(name, actors, (Maneuver(name, tuple(events), place),), place))
-    story = Story(STORY, (Act(STORY, tuple(groups), None, None, place),), place)
-    storyboard = structs.replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
-    return replace(scenario, storyboard=storyboard)
 
 
 @dataclass(frozen=True, slots=True)
