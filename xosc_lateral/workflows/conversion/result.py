@@ -279,7 +279,8 @@ class ConvertedScenario(Telling):
         return None if self.road_file is None else read_source(self.road_file).data
 
     def to_scenariogeneration(self) -> xosc.Scenario:
-        """The converted scenario as an object of scenariogeneration; `FormatError`: its parser can't read that."""
+        """The converted scenario as an object of scenariogeneration; `FormatError`: it can't be read."""
+        from traceback import walk_tb
         from xml.etree import ElementTree
 
         from scenariogeneration import xosc
@@ -290,8 +291,10 @@ class ConvertedScenario(Telling):
                 dynamics.attrib.setdefault("maxLateralAcc", "1e10")  # without it there is no limit; it wants one
             return xosc.Scenario.parse(tree)
         except Exception as error:  # whatever it did not expect
+            read = [frame.f_locals.get("element") for frame, _ in walk_tb(error.__traceback__)]
+            element = next((one.tag for one in reversed(read) if isinstance(one, ElementTree.Element)), None)
             what = f"scenariogeneration's parser can't read it: {error or type(error).__name__}; `data` is complete"
-            raise FormatError(what, path=self.output or self.source) from error
+            raise FormatError(what, path=self.output or self.source, element=element) from error
 
     @property
     def entities(self) -> tuple[str, ...]:
