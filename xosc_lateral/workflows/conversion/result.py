@@ -50,6 +50,13 @@ class LaneChanges(StrEnum):
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""
 
+_WANTED = {
+    "LaneOffsetActionDynamics": ("maxLateralAcc", "1e10"),  # without it there is no limit
+    "LanePosition": ("offset", "0"),
+    "RelativeLanePosition": ("offset", "0"),
+}
+"""Attributes that the standard lets one leave out and scenariogeneration's parser wants."""
+
 NOMINAL_RUN = "nominal"
 """Name of the run in which vehicles under test drive as written; others are named by what theirs do."""
 
@@ -287,8 +294,9 @@ class ConvertedScenario(Telling):
 
         try:
             tree = ElementTree.fromstring(self.data)
-            for dynamics in tree.iter("LaneOffsetActionDynamics"):
-                dynamics.attrib.setdefault("maxLateralAcc", "1e10")  # without it there is no limit; it wants one
+            for element in tree.iter():
+                if element.tag in _WANTED:
+                    element.attrib.setdefault(*_WANTED[element.tag])
             return xosc.Scenario.parse(tree)
         except Exception as error:  # whatever it did not expect
             read = [frame.f_locals.get("element") for frame, _ in walk_tb(error.__traceback__)]
