@@ -294,9 +294,9 @@ class ConvertedScenario(Telling):
 
         try:
             tree = ElementTree.fromstring(self.data)
-            for element in tree.iter():
-                if element.tag in _WANTED:
-                    element.attrib.setdefault(*_WANTED[element.tag])
+            for one in tree.iter():
+                if one.tag in _WANTED:
+                    one.attrib.setdefault(*_WANTED[one.tag])
             return xosc.Scenario.parse(tree)
         except Exception as error:  # whatever it did not expect
             read = [frame.f_locals.get("element") for frame, _ in walk_tb(error.__traceback__)]
