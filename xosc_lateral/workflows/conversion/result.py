@@ -294,9 +294,9 @@ class ConvertedScenario(Telling):
 
         try:
             tree = ElementTree.fromstring(self.data)
-            for one in tree.iter():
-                if one.tag in _WANTED:
-                    one.attrib.setdefault(*_WANTED[one.tag])
+            for item in tree.iter():
+                if item.tag in _WANTED:
+                    item.attrib.setdefault(*_WANTED[item.tag])
             return xosc.Scenario.parse(tree)
         except Exception as error:  # whatever it did not expect
             read = [frame.f_locals.get("element") for frame, _ in walk_tb(error.__traceback__)]
