@@ -1,6 +1,6 @@
 """Do drivers come back through the whole chain? A profile is converted with, played, imported as tracks, fitted again.
 
-    python -m laboratory.converted_round_trips [--esmini PATH] [--seeds 3] [--only NAME ...] [--write PAGE.md]
+    python -m laboratory.converted_round_trips [--esmini PATH] [--seeds 3] [--only NAME ...]
 
 Cars 300 m apart on one straight lane, each with a driver of its own, at 24 m/s. With PATH, esmini's executable plays
 the output and its log is what is imported, else our own player. Noise is added to x and y of the tracks, ten rows a
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from laboratory.agreement import own_rows, reference_rows
-from laboratory.markers import show
 from laboratory.round_trips import BANDS, SETS, planted, powers, wander
 from laboratory.storyboard import Actor, Plot, Vehicle
 from xosc_lateral.drivers.drives.resampling import STEP
@@ -116,10 +115,9 @@ def main() -> None:
     parser.add_argument("--esmini", type=Path, help="executable of the reference player")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--only", nargs="+", help="drivers of these names")
-    parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     bands = " | ".join(f"{low:g} to {high:g} Hz" for low, high in BANDS)
-    lines = [f"| drives of | set | wander | least, largest | within | between | {bands} |", "|---" * 10 + "|"]
+    print(f"| drives of | set | wander | least, largest | within | between | {bands} |\n{'|---' * 10}|")
     for title, cars, seconds, noise, is_cut in TRIPS:
         if args.only and title not in args.only:
             continue
@@ -130,9 +128,7 @@ def main() -> None:
         said = f"{cars} of {seconds:g} s" + (f", {100.0 * noise:g} cm noise" if noise else "") + ", cuts" * is_cut
         numbers = " | ".join(f"{value:.2f}" for value in middle[1:-1])
         least, largest = found[:, 0].min(), found[:, 0].max()
-        lines.append(f"| {title} | {said} | {middle[0]:.2f} | {least:.2f}, {largest:.2f} | {numbers} |")
-        print(lines[-1], flush=True)
-    show("\n".join(lines), args.write, "converted-round-trips")
+        print(f"| {title} | {said} | {middle[0]:.2f} | {least:.2f}, {largest:.2f} | {numbers} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -71,11 +71,11 @@ def convert(
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
     report = batch.get("report")
-    found = scenarios_at(scenario[0]) if is_url(scenario[0]) else scenario
-    if len(found) == 1 and is_single(found[0]) and batch.get("shard") is None:
+    places = scenarios_at(scenario[0]) if is_url(scenario[0]) else scenario
+    if len(places) == 1 and is_single(places[0]) and batch.get("shard") is None:
         limits = JobLimits(batch["job_timeout"], batch["job_memory"])
-        with sent_back(output, report, osi, summary) as places:
-            _convert_one(Path(found[0]), places, options, limits, batch["variants"], reply, labels=batch["labels"])
+        with sent_back(output, report, osi, summary) as outputs:
+            _convert_one(Path(places[0]), outputs, options, limits, batch["variants"], reply, labels=batch["labels"])
         return
     for option, stated in (("--osi", osi), ("--summary", summary)):
         if stated is not None:

@@ -72,8 +72,8 @@ def scenarios_at(stated: str | Path) -> list[Path]:
     """
     if not (url := address(stated)):
         return [Path(stated)]
-    found = inputs_of([url])
-    todo, done = [*found], {*found}
+    copies = inputs_of([url])
+    todo, done = [*copies], {*copies}
     while todo:
         file = todo.pop()
         if file.is_dir():
@@ -81,10 +81,10 @@ def scenarios_at(stated: str | Path) -> list[Path]:
         elif file.suffix.lower() == ".xosc":
             for path in _named_in(file) - done:
                 done.add(path)
-                if not any(folder in path.parents for folder in found):  # else it has come with its folder
+                if not any(folder in path.parents for folder in copies):  # else it has come with its folder
                     with suppress(FormatError):  # its reader says who names it
                         todo += inputs_of([address(path)])
-    return found
+    return copies
 
 
 def _named_in(scenario: Path) -> set[Path]:

@@ -15,10 +15,12 @@ from xosc_lateral.cli import main
 from xosc_lateral.files.profiles import write_profile
 from xosc_lateral.files.templates import TEMPLATES, find_template
 from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.convert import convert, convert_scenario
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.nominal import Activity
+
+FIELD = Path(__file__).resolve().parents[4] / "shared" / "corpus" / "esmini" / "xosc"
 
 
 @pytest.fixture(scope="module")
@@ -136,3 +138,11 @@ def test_segments_are_listed_with_reasons(tmp_path: Path, capsys: pytest.Capture
     rows = json.loads(capsys.readouterr().out)["segments"]
     assert any(row["road_following"] for row in rows)
     assert any(row["why"] == "lateral action" for row in rows)
+
+
+@pytest.mark.skipif(not FIELD.is_dir(), reason="the reference player's scenarios are not beside the checkout")
+def test_a_truck_whose_trailers_come_from_a_catalog_follows_a_trajectory() -> None:
+    """Their places are in the catalog's file, and nothing of the scenario's is taken out there."""
+    made = convert(FIELD / "lane_change.xosc", mode="trajectory", time_limit=3.0, neighbours="none")
+    assert made.modes == {"Truck": "trajectory"}
+    assert made.to_scenariogeneration() is not None

@@ -50,6 +50,13 @@ class LaneChanges(StrEnum):
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""
 
+_WANTED = {
+    "LaneOffsetActionDynamics": ("maxLateralAcc", "1e10"),  # without it there is no limit
+    "LanePosition": ("offset", "0"),
+    "RelativeLanePosition": ("offset", "0"),
+}
+"""Attributes that the standard lets one leave out and scenariogeneration's parser wants."""
+
 NOMINAL_RUN = "nominal"
 """Name of the run in which vehicles under test drive as written; others are named by what theirs do."""
 
@@ -279,19 +286,23 @@ class ConvertedScenario(Telling):
         return None if self.road_file is None else read_source(self.road_file).data
 
     def to_scenariogeneration(self) -> xosc.Scenario:
-        """The converted scenario as an object of scenariogeneration; `FormatError`: its parser can't read that."""
+        """The converted scenario as an object of scenariogeneration; `FormatError`: it can't be read."""
+        from traceback import walk_tb
         from xml.etree import ElementTree
 
         from scenariogeneration import xosc
 
         try:
             tree = ElementTree.fromstring(self.data)
-            for dynamics in tree.iter("LaneOffsetActionDynamics"):
-                dynamics.attrib.setdefault("maxLateralAcc", "1e10")  # without it there is no limit; it wants one
+            for item in tree.iter():
+                if item.tag in _WANTED:
+                    item.attrib.setdefault(*_WANTED[item.tag])
             return xosc.Scenario.parse(tree)
         except Exception as error:  # whatever it did not expect
+            read = [frame.f_locals.get("element") for frame, _ in walk_tb(error.__traceback__)]
+            element = next((one.tag for one in reversed(read) if isinstance(one, ElementTree.Element)), None)
             what = f"scenariogeneration's parser can't read it: {error or type(error).__name__}; `data` is complete"
-            raise FormatError(what, path=self.output or self.source) from error
+            raise FormatError(what, path=self.output or self.source, element=element) from error
 
     @property
     def entities(self) -> tuple[str, ...]:

@@ -69,8 +69,8 @@ class ProfileBench:
             library.mkdir()
             write_profile(self.profile, library / f"{name}.json")
             sources, variants = Path(folder) / "templates", DETECTED_VARIANTS
-            found = detect(sources, ego="none", variants=variants, profiles=(name,), library=(library,))
-            return cast("Detection", found)
+            detection = detect(sources, ego="none", variants=variants, profiles=(name,), library=(library,))
+            return cast("Detection", detection)
 
 
 def _differing_outputs(bench: ProfileBench) -> float:

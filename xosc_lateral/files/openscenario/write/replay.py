@@ -43,8 +43,8 @@ def remove_controllers(draft: Draft, converted: Collection[str]) -> None:
         if control or assigned[entity.name]:
             reason = f"ObjectController left out ('{entity.name}' follows a trajectory: controller {what})"
             draft.notes.append(entity.place.note(reason, is_warning=True, entity=entity.name))
-        item = at_node(draft.root, entity.place.node)
-        if entity.controllers and local_name(item) == "ScenarioObject":  # else described in a catalog
+        if entity.controllers and entity.place.path == str(draft.scenario.path):  # else described in a catalog
+            item = at_node(draft.root, entity.place.node)
             for owner in item.findall("{*}ObjectController"):
                 item.remove(owner)
 
