@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
+.PHONY: names pages laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed. What is installed is not listed.
 QUICK := --disable-pip-version-check --quiet --progress-bar on --no-compile
@@ -22,7 +22,7 @@ $(STAMP): pyproject.toml
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap,osi,sumo]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,osi,sumo]'
 	@touch $@
 
 # And what building the documentation needs.
@@ -44,14 +44,21 @@ style: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-# And what tests say of names, pages and links: a minute.
-lint: style
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -q -m lint
+# Tests of names, pages and links; `tests/test_names.py` keeps the list of their files.
+LINT := $(addprefix tests/,test_names.py test_layers.py test_examples.py docs/test_pages.py world/player/test_documented.py)
+names: $(DEV_STAMP)
+	$(BIN)/python -m pytest -q -m lint $(LINT)
 
-# mypy runs as one of the tests (tests/test_front_door.py), beside the others.
-test: style
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+lint: style names
+	$(BIN)/mypy
+
+# All that `make lint` does: mypy runs as one of the tests (tests/test_front_door.py), beside the others.
+test: style names
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m 'not lint and not pages'
+
+# What examples and pages print where they close a loop, the site, what is shipped: nightly, and before a release.
+pages: $(DEV_STAMP) $(DOCS_STAMP)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m pages
 
 # Under a minute, in one process: everything but what fits, converts, plays, imports or mutates for long.
 FAST := $(addprefix tests/,world/road world/scenario world/motion world/surroundings drivers/drives files test_layers.py)

@@ -60,7 +60,7 @@ RURAL = "rural"
 RURAL_SOURCE = "OpenACC, AstaZero campaign (rural road, 4 and 5 July 2019), Joint Research Centre"
 RURAL_NOTES = "Cars driven by hand on a rural road at 50 to 90 km/h, measured by differential GNSS: the population."
 GNSS = "OpenACC AstaZero, differential GNSS, 4 drives"
-MOTORWAY = "DLR Highway Traffic, 349 vehicles"
+MOTORWAY = "DLR Highway Traffic"
 NO_DATA = "No data are shipped: a profile holds fitted numbers, no track of any vehicle."
 RURAL_LICENCE = (
     "Measured by the Joint Research Centre of the European Commission, (c) European Union, CC BY 4.0: any use, "

@@ -20,14 +20,12 @@ def _collected(hash_seed: str) -> list[str]:
 
 
 def test_the_same_tests_are_collected_every_time(request: pytest.FixtureRequest) -> None:
-    """As by this run, seconds ago and under another hash seed, if it is one of all tests; else as in a second round."""
-    first = _collected("1")
-    assert len(first) > 1000
-    if [Path(name).name for name in request.config.args] == ["tests"]:
-        own = [item.nodeid for item in request.session.items]  # without what was deselected
-        chosen = set(own)
-        assert own == [name for name in first if name in chosen]
+    """Workers under hash seeds of their own compare what they collected; a single process collects twice."""
+    if hasattr(request.config, "workerinput") and "PYTHONHASHSEED" not in os.environ:
+        first = [item.nodeid for item in request.session.items]
     else:
+        first = _collected("1")
+        assert len(first) > 1000
         assert first == _collected("2")
     assert len(set(first)) == len(first), "two tests have the same id"
     assert not [name for name in first if " object at 0x" in name]

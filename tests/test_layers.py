@@ -12,6 +12,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
 RANKS = {"base": 0, "world": 1, "drivers": 1, "files": 2, "workflows": 3, "cli": 4}
 """Rank of each top folder; those of one rank do not know each other."""
 
+pytestmark = pytest.mark.lint
+
 
 def imports_of(path: Path) -> set[str]:
     """Parts of the package that a module imports, also inside functions, apart from those for type checking alone."""
@@ -30,10 +32,11 @@ def imports_of(path: Path) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("part", [path.name for path in sorted(PACKAGE.iterdir()) if (path / "__init__.py").exists()])
-def test_imports_point_to_lower_ranks(part: str) -> None:
+def test_imports_point_to_lower_ranks() -> None:
+    parts = [path.name for path in sorted(PACKAGE.iterdir()) if (path / "__init__.py").exists()]
     wrong = {
         f"{path.relative_to(PACKAGE)} imports {name}"
+        for part in parts
         for path in (PACKAGE / part).rglob("*.py")
         for name in imports_of(path)
         if name != part and RANKS[name] >= RANKS[part]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,9 +22,13 @@ VAGUE = frozenset([
 """Words that alone are no name of a constant, a function or a module: an adjective without its noun, a riddle."""
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in MODULES}
-
 pytestmark = pytest.mark.lint
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """A module as Python reads it; not while tests are collected, which every worker does."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def _named(tree: ast.Module) -> list[tuple[str, int]]:
@@ -48,7 +53,7 @@ def test_names_are_not_vague() -> None:
     vague = [
         f"{path.name}:{line}: {name}"
         for path in MODULES
-        for name, line in [(path.stem, 0), *_named(TREES[path])]
+        for name, line in [(path.stem, 0), *_named(tree_of(path))]
         if name.strip("_").lower() in VAGUE
     ]
     assert not vague, "\n".join(vague)
@@ -76,7 +81,7 @@ def test_local_names_are_no_riddles() -> None:
     riddles = [
         f"{path.name}:{line}: {name}"
         for path in MODULES
-        for name, line in _local_names(TREES[path])
+        for name, line in _local_names(tree_of(path))
         if name.strip("_") in RIDDLES and (path.name, name) not in STORED
     ]
     assert not riddles, "\n".join(riddles)
@@ -120,3 +125,12 @@ def test_pages_that_the_package_refers_to_are_in_the_repository() -> None:
     assert pages  # the pattern still matches what the package says
     assert not {(module, page) for module, page in pages if not (PACKAGE.parent / page).is_file()}
     assert not [path.name for path, text in texts.items() if re.search(r"\bDESIGN\b", text)]  # the team's own page
+
+
+def test_make_lint_knows_every_file_that_holds_lint() -> None:
+    tests = PACKAGE.parent / "tests"
+    makefile = (PACKAGE.parent / "Makefile").read_text(encoding="utf-8")
+    listed = re.search(r"^LINT := \$\(addprefix tests/,(.*)\)$", makefile, flags=re.MULTILINE)
+    assert listed is not None
+    holds = {path for path in tests.rglob("test_*.py") if "mark.lint" in path.read_text(encoding="utf-8")}
+    assert holds == {tests / name for name in listed[1].split()}

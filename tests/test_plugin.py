@@ -19,11 +19,13 @@ import sys
 import numpy as np
 import pandas as pd
 import xosc_lateral as xl
+from tests.kit.fits import coarse_fits
 from xosc_lateral.drivers.model.effects import Acts
 from xosc_lateral_acme.ripple import Ripple
 
 table = pd.read_csv(sys.argv[1])
-loop = xl.close_loop(table, seed=1, name="found")
+with coarse_fits():
+    loop = xl.close_loop(table, seed=1, name="found")
 xl.write_profile(loop.profile, "found.json")
 again = xl.read_profile("found.json")
 print([effect.kind for effect in again.effects], [effect.columns for effect in again.effects])

@@ -18,6 +18,7 @@ import pytest
 from examples.driver_simulator import simulate_drive
 from tests.kit.recordings import Case, road_file, sumo_files, write_mf4
 from xosc_lateral.cli import VERBS, main, verb
+from xosc_lateral.workflows.dossier import measures
 
 PROGRAM = "xosc-lateral "
 NEEDED = {
@@ -221,6 +222,9 @@ def test_an_example_of_a_help_runs(line: str, tmp_path: Path, monkeypatch: pytes
         (tmp_path / PLAYER).touch()
         verb("live").commands["esmini"].make_context("esmini", words[2:])
         return
+    if words[0] == "dossier":  # one template, once: `tests/workflows/test_dossier.py` looks at what is measured
+        for name, few in (("TEMPLATES", ("cut-in",)), ("SEEDS", (1,)), ("DETECTED_VARIANTS", 1)):
+            monkeypatch.setattr(measures, name, few)
     if words[:2] == ["live", "stdio"]:
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b'{"time": 0, "vehicles": {}}\n')))
     words = [name for word in words for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])]

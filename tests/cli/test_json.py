@@ -58,6 +58,7 @@ def test_every_schema_is_one_and_is_listed():
         ("dossier", "dossier motorway -o dossier.html"),
         ("sample", "sample -p motorway --duration 20 -o offsets.csv"),
         ("sample", "sample -p motorway --like drives.csv -o snippets.parquet"),
+        ("check", "check short.csv"),
         ("fit", "fit drives.csv -o fitted.json"),
         ("evaluate", "evaluate drives.csv -p motorway --no-classify"),
         ("detect", "detect in/cut-in.xosc drives.csv --variants 1 --report detection.html -o detection.csv"),

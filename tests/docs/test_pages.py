@@ -45,6 +45,8 @@ RUN = (
     "pipeline.md",
     "api.md",
 )
+FOR_PAGES = {"tutorials/researcher.md": pytest.mark.pages}
+"""Run by `make pages` alone: it closes a loop, as README's walk does; here its commands are begun."""
 RECORDING, SIMULATOR, HOUR = "a recording that is not shipped", "another program", "an hour of work"
 EXCERPT = "an excerpt or a drawing: nothing to run"
 NOT_RUN = {
@@ -89,7 +91,7 @@ def run_line(line: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", RUN)
+@pytest.mark.parametrize("page", [pytest.param(page, marks=FOR_PAGES.get(page, ())) for page in RUN])
 def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
     if page == "how_to/osi.md":
         pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
@@ -116,6 +118,7 @@ def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
         assert written.exists() or list(written.parent.glob(f"{written.stem}_*{written.suffix}")), target
 
 
+@pytest.mark.lint
 def test_every_block_is_run_or_says_why_not():
     run = {"README.md", *(f"docs/{page}" for page in RUN)}
     rest = [
@@ -138,7 +141,7 @@ def begun_commands() -> list[tuple[str, str]]:
     """Commands of this project that no test runs whole: in blocks for other programs or long work, and in the text."""
     found = []
     for page in [page for page in PAGES if page != "CHANGELOG.md"]:  # it names commands in short
-        run = page == "README.md" or page.removeprefix("docs/") in RUN
+        run = page == "README.md" or page.removeprefix("docs/") in {*RUN} - {*FOR_PAGES}
         kinds = ("text",) if run else ("", "sh", "text")
         lines = [line.split("  #")[0] for kind, text in blocks(page) if kind in kinds for line in text.splitlines()]
         prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
@@ -147,9 +150,21 @@ def begun_commands() -> list[tuple[str, str]]:
     return sorted(set(found))
 
 
-@pytest.mark.parametrize(("page", "line"), begun_commands())
-def test_a_command_that_takes_long_is_accepted(page, line, tmp_path, monkeypatch):
-    """Its program exists and takes every option and value; the work itself is left to other tests."""
+@pytest.mark.lint
+def test_commands_that_take_long_are_accepted(tmp_path, monkeypatch):
+    """Their programs exist and take every option and value; the work itself is left to other tests."""
+    refused = []
+    for page, line in begun_commands():
+        with monkeypatch.context() as patched:
+            try:
+                begin(line, tmp_path, patched)
+            except (Exception, SystemExit, pytest.fail.Exception) as error:
+                refused.append(f"{page}: {line}: {error!r}")
+    assert not refused, "\n".join(refused)
+
+
+def begin(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a command up to where the work would begin."""
     program, *words = shlex.split(re.split(r"\s[|>]\s", line)[0].replace("...", ""))
     if program == "make":
         makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -222,6 +237,7 @@ def test_links_lead_somewhere():
     assert [link for link in links if not ((ROOT / link[0]).parent / unquote(link[1])).exists()] == []
 
 
+@pytest.mark.lint
 def test_files_that_contributing_names_are_there():
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = [name for name in re.findall(r"`([\w./]+(?:\.py|\.md|\.json|/))`", text) if "NAME" not in name]
@@ -230,12 +246,14 @@ def test_files_that_contributing_names_are_there():
     assert [path for path in found if not path.exists()] == []
 
 
+@pytest.mark.lint
 def test_every_page_is_in_the_menu():
     menu = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     missing = [page for page in PAGES if page.startswith("docs/") and page.removeprefix("docs/") not in menu]
     assert missing == []
 
 
+@pytest.mark.pages
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path, monkeypatch):
     if find_spec("mkdocs") is None or find_spec("material") is None or find_spec("mkdocstrings") is None:

@@ -145,6 +145,28 @@ def test_a_full_disk_leaves_the_old_output_as_it_was(verb, tmp_path: Path) -> No
     assert not (tmp_path / "fresh").exists()
 
 
+@pytest.mark.parametrize("words", ["rename own night", "tag own --tag night"], ids=["rename", "tag"])
+def test_a_profile_of_a_library_is_changed_or_as_it_was(given: Path, tmp_path: Path, words: str) -> None:
+    def run(library: Path) -> int:
+        return main(["profiles", *words.split(), "--library", str(library)])
+
+    old, steps = tmp_path / "old", itertools.count()
+    assert main(["profiles", "add", str(given / "own.json"), "--library", str(old)]) == 0
+    out = shutil.copytree(old, tmp_path / "now")
+    assert in_child(lambda: run(out), lambda: shutil.copytree(out, tmp_path / f"left {next(steps):03}")) == 0
+    new, left = content(out), sorted(tmp_path.glob("left *"))
+    assert len(new) == 1 and len(left) > 1 and new != content(old)
+    for state in left:
+        if (state / "own.json").exists():
+            assert run(state) == 0
+        else:
+            mend([state / "night.json"])
+        assert content(state) == new, state
+    full = shutil.copytree(old, tmp_path / "full")
+    assert in_child(lambda: run(full), largest=40) == 1
+    assert content(full) == content(old)
+
+
 def test_a_run_at_work_is_not_mended(tmp_path: Path) -> None:
     with together():
         write_atomically(tmp_path / "a.csv", "new")
@@ -160,7 +182,10 @@ def test_what_others_wrote_is_not_taken_for_a_plan(tmp_path: Path) -> None:
     lure = tmp_path / "out" / ".o.1-00000000.tmp.csv"
     lure.write_text("planted")
     for number, plan in enumerate(
-        ('{"../precious.csv": ".o.1-00000000.tmp.csv"}', '{"../precious.csv": "out/x"}', "{", "[1]", '"a"')
+        (
+            *('{"../precious.csv": ".o.1-00000000.tmp.csv"}', '{"../precious.csv": "out/x"}', "{", "[1]", '"a"'),
+            *('{"../precious.csv": null}', '{".o.1-00000009.tmp.moves": null}'),
+        )
     ):
         (tmp_path / "out" / f".o.1-0000000{number}.tmp.moves").write_text(plan)
     (tmp_path / "out" / ".o.1-00000009.tmp.moves").symlink_to(precious)

@@ -29,7 +29,8 @@ def track(
         made_vehicle(name, 4.6, WIDTH, 1.4), time, x=along, y=left, heading=np.zeros(n), speed=np.full(n, speed),
         road=np.zeros(n, dtype=np.int32), lane=np.round(-1.0 - lane - across).astype(np.int32), s=along,
         offset=lateral - LANE * across, lane_width=np.full(n, LANE), lane_index=lane + across,
-        lane_count=np.full(n, 3.0), following=np.ones(n, dtype=np.bool_),
+        lane_count=np.full(n, 3.0), following=np.ones(n, dtype=np.bool_), line=np.zeros(n, dtype=np.int64),
+        rank=np.round(lane + across).astype(np.int64), station=along + 1.4,
     )  # fmt: skip
     (made,) = tracks_of(motion, cluster=name)
     return made

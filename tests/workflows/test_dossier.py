@@ -65,8 +65,11 @@ def test_every_part_has_a_clause_and_every_claim_of_ours_its_test():
         "verdict",
         "anomalies",
         "tool",
+        "process",
         "versions",
     }
+    asked = " ".join(one["asked for"] for one in contents.process)
+    assert all(word in asked for word in ("manual", "anomalous", "process", "qualification", "ASIL", "experience"))
     assert all((ROOT / claim.test).is_file() for claim in contents.claim if claim.measure)
     known = {*measures.PROFILE_MEASURES, *measures.FOLDER_MEASURES}
     assert {claim.measure for claim in contents.claim} - {""} == known

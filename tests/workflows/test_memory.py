@@ -169,23 +169,6 @@ def test_no_file_is_touched(template):
     assert done.stdout.split() == ["[]", "[]"]
 
 
-def test_a_bucket_is_read_and_written_where_fsspec_is_installed(template):
-    fsspec = pytest.importorskip("fsspec")
-    store = fsspec.filesystem("memory")
-    store.pipe(
-        {
-            "/bucket/xosc/scenario.xosc": template[0].read_bytes(),
-            f"/bucket/xosc/{template[1].name}": template[1].read_bytes(),
-        }
-    )
-    result = xl.convert("memory://bucket/xosc/scenario.xosc", "memory://bucket/out.xosc", seed=3)
-    assert store.cat("/bucket/out.xosc") == result.data == xl.convert(template[0], seed=3).data
-    with pytest.raises(xl.FormatError, match=r"nowhere://a.xosc: can't be opened: Protocol not known"):
-        xl.play("nowhere://a.xosc")
-    with pytest.raises(FileNotFoundError):
-        xl.play("memory://bucket/none.xosc")
-
-
 def test_errors_call_files_in_memory_by_their_names() -> None:
     with pytest.raises(xl.FormatError) as raised:
         xl.convert(b"<OpenSCENARIO><x></OpenSCENARIO>")

@@ -11,13 +11,20 @@ from collections.abc import Iterable
 
 MEMORY_FOLDER = re.compile(r"/in-memory-[0-9a-f]{16}/(?:up/)*")
 """Of files that a caller holds (`files.held`): he knows them by the names that come after it."""
+COPIES = re.compile(r"\S*[/\\]xosc-lateral-\w{8}[/\\]elsewhere[/\\]([a-zA-Z][a-zA-Z0-9+.-]+)[/\\]")
+"""Before the place of what lies elsewhere in its storage, of which this is a copy (`files.remote`)."""
 
 
 class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
 
     def __str__(self) -> str:
-        return printable(MEMORY_FOLDER.sub("", super().__str__()))
+        return printable(by_owner(super().__str__()))
+
+
+def by_owner(text: str) -> str:
+    """Text in which files in memory, and copies of what lies elsewhere, have the names that their owner gave."""
+    return COPIES.sub(r"\1://", MEMORY_FOLDER.sub("", text))
 
 
 NO_BREAK_SPACES = "\u00a0\u202f"
@@ -73,5 +80,5 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:
     """``path:line: element: what``, leaving out what is unknown."""
-    place = "" if path is None else f"{path}:" if line is None else f"{path}:{line}:"
+    place = "" if path is None else f"{by_owner(str(path))}:" if line is None else f"{by_owner(str(path))}:{line}:"
     return " ".join(part for part in (place, "" if element is None else f"{element}:", what) if part)

@@ -13,30 +13,39 @@ _WORDS = {
         "car, passenger car, passenger, private, pkw, auto, automobile, sedan, suv, hatchback, coupe, pickup, taxi, "
         "midsize, cabrio, limousine, kombi, small car, compact car, medium car, luxury car, small vehicle, light "
         "vehicle, motor vehicle, regular vehicle, parked vehicle, priority vehicle, emergency vehicle, emergency, "
-        "police, authority, army, vip, hov, evehicle, custom1, custom2, vehicle, agent, others, av, ego, personenwagen"
+        "ambulance, police, authority, army, vip, hov, evehicle, custom1, custom2, vehicle, agent, others, av, ego, "
+        "personenwagen"
     ),
     "van": "van, minivan, delivery van, delivery, transporter, lieferwagen, minibus, kleintransporter",
     "truck": (
         "truck, lorry, lkw, hgv, lgv, rigid truck, heavy truck, heavy vehicle, medium vehicle, large vehicle, big "
         "vehicle, long vehicle, heavy goods vehicle, goods vehicle, heavy, semi, semi truck, semitruck, semitractor, "
         "tractor, tractor trailer, truck trailer, van trailer, truck bus, articulated truck, sattelzug, lastzug, "
-        "lastwagen, lastkraftwagen, sattelschlepper, box truck, vehicular trailer truck"
+        "lastwagen, lastkraftwagen, sattelschlepper, box truck, truck cab, vehicular trailer truck"
     ),
     "bus": "bus, coach, omnibus, reisebus, linienbus, gelenkbus, school bus, articulated bus, city bus",
-    "trailer": "trailer, semitrailer, vehicular trailer, anhaenger, anhänger, auflieger",
+    "trailer": (
+        "trailer, semitrailer, vehicular trailer, message board trailer, traffic light trailer, anhaenger, anhänger, "
+        "auflieger"
+    ),
     "motorcycle": "motorcycle, motorbike, motorcyclist, moped, motorrad, kraftrad, krad, powered two wheeler, mofa",
     "bicycle": (
         "bicycle, bicyclist, cyclist, bike, cycle, riderless bicycle, tricycle, rider, fahrrad, radfahrer, velo, "
-        "scooter, standup scooter, kick scooter"
+        "scooter, standup scooter, kick scooter, wheeled rider, wheeled device"
     ),
     "pedestrian": (
         "pedestrian, ped, person, person sitting, people, walker, human, wheelchair, stroller, fussgaenger, fußgänger, "
-        "pedestrian bicycle"
+        "pedestrian bicycle, pedestrian construction worker, pedestrian police officer, pedestrian personal mobility, "
+        "official signaler"
     ),
-    "train": "train, tram, rail, rail urban, rail electric, rail fast, subway, strassenbahn, straßenbahn",
+    "train": (
+        "train, tram, railed vehicle, rail, rail urban, rail electric, rail fast, subway, strassenbahn, straßenbahn"
+    ),
     "thing": (
         "animal, static, background, construction, construction zone, misc, dontcare, building, pillar, road boundary, "
-        "median strip, obstacle, ship, aircraft, drone, container, cable car, unknown object, unknown"
+        "median strip, obstacle, ship, aircraft, drone, container, cable car, unknown object, unknown, "
+        "sign, stop sign, czone sign, mobile pedestrian crossing sign, bollard, cone, traffic cone, trafficcone, "
+        "construction cone, construction barrel, barrier, debris, pushable pullable, bicycle rack, generic object, dog"
     ),
 }
 """Class -> words for it. What is unknown may be anything: no vehicle."""
@@ -46,7 +55,10 @@ CLASS_OF = MappingProxyType({word: name for name, words in _WORDS.items() for wo
 TRUCKS = frozenset({"truck", "bus", "trailer"})  # as wide and high as trucks: `is_truck`
 DRIVEN = frozenset({"car", "van", *TRUCKS, "motorcycle"})  # by whom a lane is followed as drivers of cars do
 ON_ROADS = DRIVEN | {"bicycle"}  # what a scenario has as a vehicle
-_NAMELESS = frozenset({"", "nan", "none", "null", "other", "-", "n a"})  # no class is stated
+_NAMELESS = frozenset(
+    {"", "nan", "none", "null", "other", "other vehicle", "unset", "not set", "-", "n a"}
+)  # no class is stated
+_PREFIX = re.compile("^(perception label|label|type|class|category|(movable|static) object) ")
 _FILLERS = frozenset(
     ("type", "types", "typ", "vehicle", "veh", "class", "object", "adult", "child", "motor", "articulated", "bendy")
 ) | {"rigid", "police", "traffic", "road"}
@@ -60,7 +72,7 @@ def plain_word(word: object) -> str:
 
 def class_of(word: object) -> str | None:
     """The class that a word stands for; empty where none is stated, None where the word is not known."""
-    plain = plain_word(word)
+    plain = _PREFIX.sub("", plain_word(word))
     if plain in _NAMELESS:
         return ""
     if plain in CLASS_OF or plain.replace(" ", "") in CLASS_OF:

@@ -14,6 +14,7 @@ from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
+from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
@@ -65,14 +66,16 @@ def convert(
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.workflows.batch.guard import JobLimits
     from xosc_lateral.workflows.batch.request import is_single
+    from xosc_lateral.workflows.inputs import scenarios_at
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
     report = batch.get("report")
-    if len(scenario) == 1 and is_single(scenario[0]) and batch.get("shard") is None:
+    found = scenarios_at(scenario[0]) if is_url(scenario[0]) else scenario
+    if len(found) == 1 and is_single(found[0]) and batch.get("shard") is None:
         limits = JobLimits(batch["job_timeout"], batch["job_memory"])
-        source, variants, labels = Path(scenario[0]), batch["variants"], batch["labels"]
-        _convert_one(source, output, options, limits, variants, report, osi, summary, reply, labels=labels)
+        with sent_back(output, report, osi, summary) as places:
+            _convert_one(Path(found[0]), places, options, limits, batch["variants"], reply, labels=batch["labels"])
         return
     for option, stated in (("--osi", osi), ("--summary", summary)):
         if stated is not None:
@@ -100,8 +103,8 @@ def _refuse_together(settings: Mapping[str, Any]) -> None:
 
 
 def _convert_one(
-    source: Path, output: str | None, options: dict[str, Any], limits: JobLimits, variants: int,
-    report: str | None, osi: str | None, summary: str | None, reply: Written, *, labels: bool,
+    source: Path, places: Sequence[str | None], options: dict[str, Any], limits: JobLimits, variants: int,
+    reply: Written, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
@@ -115,6 +118,7 @@ def _convert_one(
     def limited(target: Path | None, **more: Any) -> Conversion:
         return for_one(lambda path: convert(path, target, **more, **options), source, limits)
 
+    output, report, osi, summary = places
     if output == STDOUT:
         if variants > 1 or reply.as_json or osi is not None or summary is not None or labels:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
@@ -124,7 +128,8 @@ def _convert_one(
         _warn_if_cut_off(result, reply.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
-        written = default_output(source) if output is None else output_scenario(output, source)
+        here = Path(source.name) if address(source) else source
+        written = default_output(here) if output is None else output_scenario(output, source)
         page = None if report is None else output_file(report, f"{written.stem}.html", PAGE_SUFFIXES)
         trace = None if osi is None else osi_files(osi, source)[0]
         words = None if summary is None else output_file(summary, f"{written.stem}.md", SUMMARY_SUFFIXES)

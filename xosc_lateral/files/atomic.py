@@ -72,7 +72,8 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     return path
 
 
-_STAGED: ContextVar[tuple[dict[Path, Path], ExitStack] | None] = ContextVar("staged", default=None)
+Staged = Mapping[Path, Path | None]  # Output and the temporary file that becomes it; None: it is removed.
+_STAGED: ContextVar[tuple[dict[Path, Path | None], ExitStack] | None] = ContextVar("staged", default=None)
 
 
 @contextmanager
@@ -86,7 +87,7 @@ def together() -> Iterator[None]:
         yield
         return
     with ExitStack() as kept:
-        staged: dict[Path, Path] = {}
+        staged: dict[Path, Path | None] = {}
         token = _STAGED.set((staged, kept))
         try:
             yield
@@ -95,9 +96,16 @@ def together() -> Iterator[None]:
         first = next(iter(staged), None)
         if first is not None and len(staged) > 1:
             with _naming(first):
-                plan = {os.path.relpath(path, first.parent): temporary.name for path, temporary in staged.items()}
+                plan = {os.path.relpath(path, first.parent): one and one.name for path, one in staged.items()}
                 kept.enter_context(_temporary_beside(first, _PLAN)).write_text(json.dumps(plan), "utf-8")
         _move(staged)
+
+
+def remove_together(path: Path) -> None:
+    """Within `together`, a file beside its outputs goes when they appear."""
+    staged = _STAGED.get()
+    assert staged is not None
+    staged[0][path] = None
 
 
 @contextmanager
@@ -110,18 +118,25 @@ def at_once() -> Iterator[None]:
         _STAGED.reset(token)
 
 
-def _move(staged: Mapping[Path, Path]) -> None:
+def _move(staged: Staged) -> None:
     """Move temporary files to their places; once begun, it is gone through with."""
     try:
         for path, temporary in staged.items():
             with _naming(path):
-                temporary.replace(path)
-            LOG.info("wrote %s", path)
+                _put(path, temporary)
+            LOG.info("wrote %s" if temporary else "removed %s", path)
     except BaseException:
         for path, temporary in staged.items():
             with contextlib.suppress(OSError):
-                temporary.replace(path)
+                _put(path, temporary)
         raise
+
+
+def _put(path: Path, temporary: Path | None) -> None:
+    if temporary is None:
+        path.unlink(missing_ok=True)
+    else:
+        temporary.replace(path)
 
 
 @contextmanager
@@ -191,10 +206,14 @@ def mend(outputs: Iterable[Path]) -> None:
                 path.unlink()
 
 
-def _finish(folder: Path, plan: Mapping[str, str], begun: re.Pattern[str]) -> None:
-    """Move what is left to move; a plan says nothing but which temporary file of an output becomes it."""
+def _finish(folder: Path, plan: Mapping[str, str | None], begun: re.Pattern[str]) -> None:
+    """Move what is left to move; a plan says which temporary file of an output becomes it, or what beside it goes."""
     for relative, name in plan.items():
         path = folder / relative
+        if name is None:
+            if path == folder / path.name and path.is_file() and not path.is_symlink():
+                path.unlink()
+            continue
         match = begun.fullmatch(name)
         if match and match[1] == path.stem[:_STEM] and (path.parent / name).is_file():
             (path.parent / name).replace(path)

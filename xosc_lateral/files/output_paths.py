@@ -16,6 +16,7 @@ from typing import Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import mend
+from xosc_lateral.files.remote import is_url
 from xosc_lateral.files.source import file_hash
 
 STDOUT = "-"  # name of the standard output where an output is asked for
@@ -37,6 +38,8 @@ def path_below(folder: Path, name: str, what: str) -> Path:
 
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix."""
+    if is_url(output):
+        raise FormatError("scenarios alone are written to such places; name a file", path=output)
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"

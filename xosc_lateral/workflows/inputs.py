@@ -6,14 +6,16 @@ import html
 import os
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path, PureWindowsPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, TypeAlias
 from xml.etree import ElementTree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.held import Held, hold
-from xosc_lateral.files.remote import fetched, is_url, urljoin
+from xosc_lateral.files.openscenario.references import LEVELS_UP
+from xosc_lateral.files.remote import address, inputs_of, local
 from xosc_lateral.files.source import read_source
 
 DocumentLike: TypeAlias = Any
@@ -24,6 +26,7 @@ RoadLike: TypeAlias = Any
 _KINDS = "a path, bytes, XML text, a file-like object, an lxml tree or a scenariogeneration object"
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _LOGIC_FILE = re.compile(rb"<LogicFile\s[^>]*?filepath\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_NAMED = re.compile(rb"<(?:LogicFile|Directory|ScenarioFile)\s[^>]*?(?:file)?path\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _ENCODING = re.compile(r"\A(\s*<\?xml[^>]*?)\s+encoding\s*=\s*[\"'](?!utf-?8[\"'])[^\"']*[\"']", re.IGNORECASE)
 
 
@@ -44,16 +47,14 @@ def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: s
     in_memory = _document(scenario, "scenario")
     of_road = None if road is None or isinstance(road, Mapping) else _document(road, "road")
     if in_memory is None and not isinstance(road, Mapping) and of_road is None:
-        return ScenarioInput(Path(scenario), None if road is None else Path(road))
+        return ScenarioInput(scenarios_at(scenario)[0], None if road is None else local(road))
     if in_memory is None:
-        path = Path(scenario)
+        path = scenarios_at(scenario)[0]
         name, data = path.name, read_source(path).data
     else:
-        stated = scenario if is_url(scenario) else getattr(scenario, "name", "") if hasattr(scenario, "read") else ""
+        stated = getattr(scenario, "name", "") if hasattr(scenario, "read") else ""
         name, data = (Path(stated).name if isinstance(stated, str) else "") or f"{name}.xosc", in_memory
     files, road_name = {name: data}, None
-    if road is None and is_url(scenario) and (written := _road_in(data)):
-        files[written] = fetched(urljoin(str(scenario), written))
     if isinstance(road, Mapping):
         files |= {str(key): _bytes(value, f"road[{key!r}]") for key, value in road.items()}
     elif road is not None:
@@ -64,6 +65,37 @@ def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: s
     return ScenarioInput(held.folder / name, None if road_name is None else held.folder / road_name, held)
 
 
+def scenarios_at(stated: str | Path) -> list[Path]:
+    """Scenarios, folders and tables of them at a path or pattern; if elsewhere, copies, with roads and catalogs.
+
+    Raises `FormatError`: see `files.remote`.
+    """
+    if not (url := address(stated)):
+        return [Path(stated)]
+    found = inputs_of([url])
+    todo, done = [*found], {*found}
+    while todo:
+        file = todo.pop()
+        if file.is_dir():
+            todo += file.rglob("*.xosc")
+        elif file.suffix.lower() == ".xosc":
+            for path in _named_in(file) - done:
+                done.add(path)
+                if not any(folder in path.parents for folder in found):  # else it has come with its folder
+                    with suppress(FormatError):  # its reader says who names it
+                        todo += inputs_of([address(path)])
+    return found
+
+
+def _named_in(scenario: Path) -> set[Path]:
+    """Roads, catalogs and scenarios that a copy of one names, no farther away than its reader would look."""
+    matches = _NAMED.finditer(_COMMENT.sub(b"", read_source(scenario).data))
+    written = [html.unescape((one[1] or one[2] or b"").decode(errors="replace")) for one in matches]
+    names = [PurePosixPath(name.strip().replace("\\", "/")) for name in written if name.strip()]
+    near = (name for name in names if name.parts.count("..") <= LEVELS_UP and not name.is_absolute())
+    return {Path(os.path.normpath(scenario.parent / name)) for name in near}
+
+
 def several(stated: Any) -> list[Any]:
     """One of them, or several."""
     is_list = isinstance(stated, Sequence) and not isinstance(stated, str | bytes | bytearray | memoryview)
@@ -72,7 +104,7 @@ def several(stated: Any) -> list[Any]:
 
 def _bytes(stated: Any, what: str) -> bytes:
     data = _document(stated, what)
-    return read_source(stated).data if data is None else data
+    return read_source(local(stated)).data if data is None else data
 
 
 def _document(stated: Any, what: str) -> bytes | None:
@@ -81,8 +113,6 @@ def _document(stated: Any, what: str) -> bytes | None:
         return bytes(stated)
     if isinstance(stated, str) and stated.lstrip("\ufeff \t\r\n").startswith("<"):
         return _encoded(stated)
-    if is_url(stated):
-        return fetched(stated)
     if isinstance(stated, str | os.PathLike):
         return None
     if hasattr(stated, "read"):

@@ -13,6 +13,7 @@ from xosc_lateral.drivers.drives.drive import CutRules, Drive, Run
 from xosc_lateral.drivers.fitting.context_effects import (
     FADING_DISTANCE,
     LEAST_DRIVES,
+    _shapes,
     _shrunk,
     fit_context_effects,
     without_effects,
@@ -82,6 +83,17 @@ def test_too_few_drives_and_missing_columns_give_none():
     assert fit_context_effects([]) == ()
     bare = [made_run(run.offset, drive=run.drive) for run in population(2, truck=-0.5)]
     assert fit_context_effects(bare) == ()  # everybody at one speed
+
+
+def test_a_speed_that_only_jitters_acts_on_nothing():
+    """Everybody at 24 m/s, known by positions: an effect of that noise would make every row jitter."""
+    for seed in range(5):
+        rng = np.random.default_rng([seed, 7])
+        still = smooth_runs(40, 60.0, seed)
+        runs = [replace(run, context={"speed": rng.normal(24.0, 0.15, len(run))}) for run in still]
+        assert fit_context_effects(runs) == ()
+        drives = [replace(run, context={"speed": run.context["speed"] + rng.normal(0.0, 1.0)}) for run in runs]
+        assert _shapes(drives), "drives at different speeds are asked"
 
 
 def test_what_is_taken_out_is_gone():

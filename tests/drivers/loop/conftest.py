@@ -9,8 +9,8 @@ import pytest
 
 from examples.driver_simulator.plants import Plant
 from examples.driver_simulator.simulator import Driver, simulate_drive
+from tests.kit.fits import coarse_fits
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.fitting.models import autoregressive_fit
 from xosc_lateral.files.drives import read_drives
 
 
@@ -39,8 +39,5 @@ def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
 
 @pytest.fixture(scope="package", autouse=True)
 def _coarse_fits() -> Iterator[None]:
-    """Base models are fitted with an eighth of the simulated snippets: chance moves their spreads by 2 %."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(autoregressive_fit, "SIMULATED_DRIVERS", autoregressive_fit.SIMULATED_DRIVERS // 8)
-        patched.setattr(autoregressive_fit, "FOR_EACH", autoregressive_fit.FOR_EACH // 8)
+    with coarse_fits():
         yield

@@ -54,7 +54,9 @@ def test_contacts_under_other_egos_are_counted_apart():
 def test_causes_are_alike_but_for_files_names_and_numbers():
     said = [(replace(CALM, output=f"{k}.xosc"), f"a/{k}.xosc:{k}: no entity 'X{k}' at {k}.5 s") for k in range(3)]
     said += [(CALM, "calm.xosc: the file is empty")] * 2
-    (several, of_several), (one, of_one) = by_cause(said)
+    said += [(replace(CALM, output=f"r{k}.xosc"), f"road 'r{k}' is gone (looked for /db/r{k}.xodr)") for k in range(4)]
+    (lost, of_lost), (several, of_several), (one, of_one) = by_cause(said)
+    assert (lost, len(of_lost)) == ("road … is gone (looked for …)", 4)
     assert (several, len(of_several)) == ("no entity … at … s", 3)
     assert (one, of_one) == ("the file is empty", [CALM]), "one output counts once"
 

@@ -12,6 +12,8 @@ from lxml import html
 
 import xosc_lateral as xl
 from tests.kit.enriched import converted, made_enriched
+from tests.kit.made.actions import ACTIONS
+from tests.kit.made.scenario import made as made_scenario
 from xosc_lateral.workflows.conversion.meaning import OTHER_RUNS, KeptMeaning
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
@@ -20,17 +22,40 @@ from xosc_lateral.workflows.playing.figures import accelerations_over_time
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 
-KINDS: list[tuple[str, dict[str, Any]]] = [
+TRAILER = list(ACTIONS).index("connect_trailer")
+
+KINDS: list[tuple[str | int, dict[str, Any]]] = [
     ("cut-in", {"seed": 1, "parameters": {"ego_speed": "28"}}),
     ("cut-in", {"seed": 2, "mode": "lane-offset"}),
     ("cut-in", {"ego": ["none"]}),
+    ("cut-in traffic=left", {"ego": ["none"], "mode": "trajectory", "time_limit": 12.0}),
+    ("cut-in", {"ego": ["Ego", "CutIn", "Truck"], "mode": "trajectory"}),
     ("overtake-truck", {}),
     ("overtake-truck", {"ego": ["none"], "lane_changes": "lifelike"}),
+    ("overtake-truck", {"mode": "trajectory", "entity": {"Truck": "motorway-vehicle-1"}, "variant": 3}),
     ("braking-leader", {"seed": 3}),
+    ("braking-leader", {"mode": "trajectory", "profile": "rural", "player": "carla"}),
     ("jam-end", {"only": ["Follower"]}),
+    ("jam-end", {"ego": ["none"], "mode": "trajectory", "jam_corridor": True}),
     ("curves", {"seed": 4}),
     ("curves", {"seed": 4, "mode": "trajectory", "with_sensor": True}),
+    ("dense-traffic", {"mode": "trajectory", "neighbours": "none", "time_limit": 8.0}),
+    (TRAILER, {"mode": "trajectory"}),
+    *((TRAILER + further, {}) for further in (1, 9, 20, 31, 44)),
 ]
+"""Templates with their settings, or seeds of made scenarios; options of the conversion."""
+
+
+def scenario_of(kind: str | int, folder: Path) -> Path:
+    if isinstance(kind, int):
+        _, road, text = made_scenario(kind)
+        (folder / "road.xodr").write_text(road, encoding="utf-8")
+        (folder / "made.xosc").write_text(text, encoding="utf-8")
+        return folder / "made.xosc"
+    name, *settings = kind.split()
+    if not settings:
+        return TEMPLATES / f"{name}.xosc"
+    return xl.write_template(name, folder, **dict(one.split("=") for one in settings))[0]
 
 
 class Read(NamedTuple):
@@ -70,14 +95,15 @@ def numbers(rows: list[dict[str, str]], column: str) -> list[float]:
     return [float(row[column]) for row in rows if row[column] != "–"]
 
 
-@pytest.mark.parametrize(("template", "options"), KINDS)
-def test_no_two_numbers_for_one_name(template: str, options: dict[str, Any]) -> None:
-    made = xl.convert(TEMPLATES / f"{template}.xosc", **options)
+@pytest.mark.parametrize(("kind", "options"), KINDS)
+def test_no_two_numbers_for_one_name(kind: str | int, options: dict[str, Any], tmp_path: Path) -> None:
+    made = xl.convert(scenario_of(kind, tmp_path), **options)
     page, values = read(conversion_page(made)), made.to_dict()
-    done, gaps = page.tables["Enriched"], page.tables.get("Pairs", [])
+    done, gaps = page.tables.get("Enriched", []), page.tables.get("Pairs", [])
 
     enriched = [one["name"] for one in values["entities"] if one["profile"]]
-    assert page.lead.startswith(f"{len(enriched)} of {len(values['entities'])} entities")
+    begin = f"{len(enriched)} of {len(values['entities'])} entities" if enriched else "No entity was enriched"
+    assert page.lead.startswith(begin) and "The result is in" not in page.lead
     assert [row["entity"] for row in done] == enriched
     assert sorted(one["name"] for one in page.scene["entities"] if "enriched" in one) == sorted(enriched)
     assert f"{values['end_time']:.1f} s (ended by the {values['ended_by']})" in page.lead
@@ -86,6 +112,9 @@ def test_no_two_numbers_for_one_name(template: str, options: dict[str, Any]) -> 
         assert float(row["std. deviation [m]"]) == pytest.approx(one["offset_spread"], rel=0.01)
         assert int(row["segments"]) == len(one["segments"])
 
+    if not enriched:
+        assert not page.tiles and not page.marked
+        return
     time, _ = page.tiles["road-following, all entities together"]
     assert time == pytest.approx(sum(numbers(done, "time [s]")), abs=0.5 + 0.05 * len(done))
     _, note = page.tiles["standard deviation of the offsets"]

@@ -140,6 +140,7 @@ def test_the_population_and_single_vehicles_are_shipped():
     assert names == {POPULATION, "motorway-refined", "rural", *single}
 
 
+@pytest.mark.pages
 def test_most_shipped_profiles_differ_beyond_what_their_few_minutes_tell():
     """But for the refined one, whose effects even traffic doesn't show, and single drivers with 2 to 4 minutes each."""
     compared = compare([read_profile(path.stem) for path in list_profiles() if path.stem != "motorway-refined"], 0)

@@ -91,6 +91,6 @@ def test_page_and_text_say_what_the_fit_says(tmp_path: Path) -> None:
     health = check(path)
     assert not health.wrong and not health.is_guessed
     profile = fit(path)
-    assert profile.sensor is not None and profile.sensor.in_words() in health.can()
+    assert profile.sensor is not None and profile.sensor.in_words() == health.sensor
     page = unescape(health.write_report(tmp_path / "page.html").read_text(encoding="utf-8"))
     assert profile.sensor.in_words() in page and health.headline().split(";")[0] in page

@@ -91,7 +91,9 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def result(table: Path) -> LoopResult:
-    return close_loop(read_drives([table]), seed=1)
+    """Of five columns that may act; which one does among all is asked in `tests/drivers/loop` and of README's walk."""
+    idle = ("wind_speed", "wind_direction", "rain", "illuminance", "air_temperature", "car_left", "lead_distance")
+    return close_loop(read_drives([table]), seed=1, excluded=(*idle, "truck_right"))
 
 
 @pytest.fixture(scope="module")

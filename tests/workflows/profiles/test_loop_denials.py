@@ -12,7 +12,6 @@ from tests.kit import simulated as plants
 from tests.kit.profiles import as_drive
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.fitting.models import autoregressive_fit
 from xosc_lateral.drivers.loop.close import LoopResult, close_loop
 from xosc_lateral.workflows.profiles.loop_json import loop_record
 from xosc_lateral.workflows.profiles.loop_words import outcome
@@ -31,17 +30,13 @@ def loops() -> dict[str, LoopResult]:
     """Of who keeps away from trucks, with two seeds, his profile again, and of six short drives without an effect."""
     long = [drive(101, 700.0, plants.truck_avoidance(0.5))]
     short = [drive(110 + k, 170.0, passengers=float(k % 3), night=float(k == 0)) for k in range(6)]
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(autoregressive_fit, "SIMULATED_DRIVERS", autoregressive_fit.SIMULATED_DRIVERS // 8)
-        patched.setattr(autoregressive_fit, "FOR_EACH", autoregressive_fit.FOR_EACH // 8)
-        first = close_loop(long, seed=1)
-        again = close_loop(long, first.refined, seed=1, in_sample=True)
-        return {
-            "one": first,
-            "other seed": close_loop(long, seed=2),
-            "again": again,
-            "short": close_loop(short, seed=1),
-        }
+    first = close_loop(long, seed=1)
+    return {
+        "one": first,
+        "other seed": close_loop(long, seed=2),
+        "again": close_loop(long, first.refined, seed=1, in_sample=True),
+        "short": close_loop(short, seed=1),
+    }
 
 
 CASES = ["one", "other seed", "again", "short"]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.kit.doors import STEP, fcd, highd, osi_trace
 from xosc_lateral import XoscLateralError, import_drives, read_drives, reconstruct
 from xosc_lateral.drivers.drives.identity import clock_runs, frozen, identify, leaps
 from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad
@@ -16,7 +17,7 @@ from xosc_lateral.workflows.detection.sources import SourceSettings, sources_of
 from xosc_lateral.workflows.recordings.recordings import read_recordings
 from xosc_lateral.workflows.result import given_drives
 
-STEP, COUNT = 0.1, 600
+COUNT = 600
 
 
 @pytest.fixture
@@ -68,65 +69,15 @@ TRUTH = {
 }
 
 
-def _highd(traffic: pd.DataFrame, folder: Path) -> Path:
-    tracks = traffic.assign(frame=np.round(traffic["time"] / STEP).astype(int), width=4.5, height=1.8)
-    tracks = tracks.assign(x=traffic["x"] - 2.25, y=-traffic["y"] - 0.9, xVelocity=30.0, xAcceleration=0.0)
-    tracks.drop(columns=["class", "length", "time"]).to_csv(folder / "01_tracks.csv", index=False)
-    ids = sorted(set(traffic["id"]))
-    meta = pd.DataFrame({"id": ids, "drivingDirection": 2, "class": "Car"})
-    meta.to_csv(folder / "01_tracksMeta.csv", index=False)
-    about = {"frameRate": [10], "upperLaneMarkings": ["-9;-6"], "lowerLaneMarkings": ["0;3.5;7"]}
-    pd.DataFrame(about).to_csv(folder / "01_recordingMeta.csv", index=False)
-    return folder / "01_tracks.csv"
-
-
-def _fcd(traffic: pd.DataFrame, folder: Path) -> tuple[Path, Path]:
-    """SUMO's output on one edge of two lanes; x and y are the front bumper."""
-    net, fcd = folder / "run.net.xml", folder / "fcd.xml"
-    lane = '<lane id="e_{0}" index="{0}" speed="36" length="4000" width="3.5" shape="0,{1} 4000,{1}"/>'
-    net.write_text(f'<net><edge id="e">{lane.format(0, -5.25)}{lane.format(1, -1.75)}</edge></net>')
-    steps = []
-    traffic = traffic.assign(lane=(traffic["y"] > -3.5).astype(int))
-    traffic = traffic.assign(side=traffic["y"] + np.where(traffic["lane"] == 1, 1.75, 5.25))
-    for at, rows in traffic.groupby("time", sort=True):
-        cars = "".join(
-            f'<vehicle id="{row.id}" x="{row.x + 2.25:.6f}" y="{row.y:.6f}" angle="90" type="car" speed="30" '
-            f'pos="{row.x + 2.25:.6f}" lane="e_{row.lane}" posLat="{row.side:.6f}"/>'
-            for row in rows.itertuples()
-        )
-        steps.append(f'<timestep time="{at:.6f}">{cars}</timestep>')
-    fcd.write_text(f"<fcd-export>{''.join(steps)}</fcd-export>")
-    return fcd, net
-
-
-def _osi(traffic: pd.DataFrame, folder: Path) -> Path:
-    osi_utilities = pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
-    from osi3.osi_sensorview_pb2 import SensorView
-
-    path = folder / "made_gt.osi"
-    with osi_utilities.SingleTraceWriter() as writer:
-        writer.open(path)
-        for at, rows in traffic.groupby("time", sort=True):
-            message = SensorView().global_ground_truth
-            message.timestamp.seconds, message.timestamp.nanos = divmod(round(float(at) * 1e9), 1_000_000_000)
-            for row in rows.itertuples():
-                one = message.moving_object.add(type=2)
-                one.id.value, one.base.dimension.length = int(row.id), 4.5
-                one.base.position.x, one.base.position.y, one.base.position.z = row.x, row.y, 0.0
-                one.vehicle_classification.type = 4
-            writer.write_message(message)
-    return path
-
-
 @pytest.mark.parametrize("kind", ["leaping", "standing", "plain"])
 @pytest.mark.parametrize("door", ["fcd", "osi"])
 def test_doors_of_simulators_see_the_same(door: str, kind: str, tmp_path: Path, road: Path) -> None:
     traffic, truth = TRAFFIC[kind](), TRUTH[kind]
     if door == "fcd":
-        source, net = _fcd(traffic, tmp_path)
+        source, net = fcd(traffic, tmp_path)
         imported, case = import_drives("fcd", source, net=net), {"road": net}
     else:
-        source = _osi(traffic, tmp_path)
+        source = osi_trace(traffic, tmp_path)
         imported, case = import_drives("osi", source, road=road), {"road": road}
     assert set(imported.table["drive"]) == truth
     assert sum(imported.provenance.rows.values()) == len(traffic)
@@ -166,10 +117,10 @@ def test_all_doors_see_the_same_vehicles_and_count_all_rows(kind: str, tmp_path:
     imported = import_drives("tracks", path, road=road)
     assert set(imported.table["drive"]) == truth
     assert sum(imported.provenance.rows.values()) == len(traffic)
-    highd = import_drives("levelx", _highd(traffic, tmp_path))
-    assert {name.removeprefix("highd-01-") for name in highd.table["drive"]} == truth
-    assert sum(highd.provenance.rows.values()) == len(traffic)
-    states = "frozen" in imported.provenance.rows, "frozen" in highd.provenance.rows
+    other = import_drives("levelx", highd(traffic, tmp_path))
+    assert {name.removeprefix("highd-01-") for name in other.table["drive"]} == truth
+    assert sum(other.provenance.rows.values()) == len(traffic)
+    states = "frozen" in imported.provenance.rows, "frozen" in other.provenance.rows
     assert states == (kind == "standing",) * 2
     every = read_recordings(path, road=road)
     assert {track.name for one in every for track in one.tracks} == truth

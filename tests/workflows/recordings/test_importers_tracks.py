@@ -284,6 +284,8 @@ def test_a_log_of_esmini_has_vehicles_that_come_and_go(road, tmp_path):
     c = rows[rows["vehicle"] == "c"]
     x, _ = world(300.0 - 1.4 + 30.0 * c["time"].to_numpy(), np.full(len(c), -1.5 * WIDTH))
     assert c["x"].to_numpy() == pytest.approx(x, abs=1e-5)
+    known = import_tracks(source, road=road)  # "c" goes from the third columns to the first: its clock does not
+    assert set(known.table["drive"]) == {"a", "b", "c"} and not known.provenance.notes
 
 
 @pytest.mark.parametrize(

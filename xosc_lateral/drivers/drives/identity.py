@@ -112,7 +112,7 @@ class Identified:
 
 def identify(
     names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray,
-    recording: Sequence[str] | None = None, *, path: Path = Path("rows"),
+    recording: Sequence[str] | pd.Series | None = None, *, path: Path = Path("rows"),
 ) -> Identified:  # fmt: skip
     """Vehicles of rows in file order; `vehicle`: index into `names`, shape (n,) as all. [s], [m]
 
@@ -122,7 +122,7 @@ def identify(
     labels = np.zeros(len(time), dtype=np.int64)
     stated: list[str] = []
     if recording is not None:
-        labels, known = pd.factorize(np.asarray(recording, dtype=object))
+        labels, known = pd.Series(recording).factorize()
         stated = [str(label) for label in known]
     runs = clock_runs(time, labels * (int(vehicle.max(initial=0)) + 1) + vehicle)
     most = int(runs.max(initial=0)) + 1

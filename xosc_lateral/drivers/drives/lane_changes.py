@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 
@@ -36,14 +37,6 @@ class Rough:
     cut: bool = False
 
 
-def lateral_speed(time: FloatArray, y: FloatArray) -> FloatArray:
-    """Difference over `RATE_WINDOW`, one-sided at the ends, shape (n,). [m/s]"""
-    half = max(1, round(0.5 * RATE_WINDOW / float(np.median(np.diff(time)))))
-    rows = np.arange(len(y))
-    low, high = np.maximum(rows - half, 0), np.minimum(rows + half, len(y) - 1)
-    return np.asarray((y[high] - y[low]) / (time[high] - time[low]))
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Course:
     """How a vehicle moves across its lanes, at the recorded rows; arrays of shape (n,)."""
@@ -67,7 +60,7 @@ class Course:
         cls, time: FloatArray, y: FloatArray, base: FloatArray, lanes: IntArray, side: FloatArray, **limits: float
     ) -> Course:
         """Of a position across the lanes and the centres of the lanes that it is in."""
-        return cls(time, y, base, lanes, lateral_speed(time, y), side, **limits)
+        return cls(time, y, base, lanes, rate(y, time, RATE_WINDOW), side, **limits)
 
     def changing(self, margin: float, *, in_part: bool = True) -> BoolArray:
         """Rows from a margin [s] before a lane change begins to a margin after it is over, shape (n,).

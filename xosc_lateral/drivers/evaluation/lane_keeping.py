@@ -9,6 +9,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH
 from xosc_lateral.drivers.evaluation.metrics import free_runs
@@ -49,7 +50,7 @@ def time_to_line_crossing(
     0 where the side is beyond the marking already, at most `LONGEST_TLC`, shape (..., m - 1); from `offset` and
     `lane_width`, shape (..., m).
     """
-    speed = np.diff(offset, axis=-1) / step
+    speed = rate(offset, step, past=True)[..., 1:]
     towards = np.sign(speed) * offset[..., 1:]
     room = np.maximum(0.5 * lane_width[..., 1:] - half_width - towards, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -168,7 +169,7 @@ def summarise(drives: FloatArray, step: float) -> MovementSummary:
         spread_within=float(windows.std(axis=1).mean()),
         low=float(low),
         high=float(high),
-        lateral_speed=float(np.sqrt((np.diff(drives, axis=1) ** 2).mean()) / step),
+        lateral_speed=float(np.sqrt((rate(drives, step, past=True)[:, 1:] ** 2).mean())),
     )
 
 

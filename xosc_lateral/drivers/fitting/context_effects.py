@@ -130,11 +130,20 @@ def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
         kept.append(Linear(acts=Acts.LOCATION, column="is_truck"))
     if "lane_index" in varying:
         kept.append(Levels(acts=Acts.LOCATION, column="lane_index", levels=(RIGHTMOST,)))
-    if "speed" in varying:
+    if "speed" in varying and _lasts([run.context["speed"] for run in runs]):
         low, high = all_significant(np.quantile(columns["speed"], STRAIGHT_QUANTILES), 3)
         if high > low:
             kept.append(Piecewise(acts=Acts.LOCATION, column="speed", knots=(low, high)))
     return kept
+
+
+def _lasts(columns: Sequence[FloatArray]) -> bool:
+    """Whether a column differs more between snippets than within them. If not, it is the jitter of a derived speed, of
+    which snippets' means say nothing, and which as an effect would make every row jitter."""
+    size = round(SNIPPET / STEP)
+    parts = [column[: len(column) // size * size].reshape(-1, size) for column in columns]
+    snippets = np.concatenate(parts) if parts else np.empty((0, size))
+    return len(snippets) > 0 and bool(snippets.mean(axis=1).var() > snippets.var(axis=1).mean())
 
 
 def _snippets(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> tuple[FloatArray, FloatArray, IntArray]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -79,8 +79,15 @@ class _Scored:
     problem: Problem
     dictionary: Dictionary
     known: FloatArray  # shape (seconds, k), orthonormal
-    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
+    alone: FloatArray  # shape (entries,): Squared score less cost, of products not beside their parts; -inf: barred.
     maxima: FloatArray  # shape (draws,): The largest that the null gives.
+    left: FloatArray  # shape (seconds,): What the scores are of.
+    span: Callable[[str], FloatArray]  # All that a column does alone, shape (seconds, rank), orthonormal.
+
+    @cached_property
+    def scores(self) -> FloatArray:
+        """Squared score less cost, shape (entries,); -inf: barred."""
+        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span)
 
     @property
     def best(self) -> int:
@@ -201,8 +208,7 @@ class ColumnSearch:
             both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
             return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
 
-        scores = beside_parts(scores, dictionary, left, known, span)
-        return _Scored(problem, dictionary, known, scores, maxima)
+        return _Scored(problem, dictionary, known, scores, maxima, left, span)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
         """The term that the best candidate becomes, and the fit with it.

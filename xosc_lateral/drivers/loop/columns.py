@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.rates import rate
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.loop.autocorrelation import positions_in_run
 from xosc_lateral.drivers.loop.timeline import PAD, Timeline
@@ -311,7 +312,7 @@ def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
     offset = np.where(inside, timeline.offset - np.median(timeline.offset[inside]), 0.0)
     size = np.abs(offset)
     usual = float(np.quantile(size[inside], 0.75))
-    speed = np.gradient(offset, timeline.step)
+    speed = rate(offset, timeline.step)
     return {
         "offset": offset,
         "size of the offset": size,

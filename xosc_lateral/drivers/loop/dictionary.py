@@ -206,12 +206,10 @@ def beside_parts(
         candidate = dictionary.candidates[index]
         if len(candidate.columns) > 1 and not candidate.of_vector:
             members.setdefault(candidate.columns, []).append(int(index))
-    scores, open_pairs = scores.copy(), set(members)
-    while open_pairs:
-        pair = max(open_pairs, key=lambda columns: float(scores[members[columns]].max()))
-        if float(scores[members[pair]].max()) < float(scores.max()) - LIKELIHOOD_MARGIN:
+    scores, best = scores.copy(), {pair: float(scores[entries].max()) for pair, entries in members.items()}
+    for pair in sorted(members, key=best.__getitem__, reverse=True):
+        if best[pair] < float(scores.max()) - LIKELIHOOD_MARGIN:
             break
-        open_pairs.remove(pair)
         entries = members[pair]
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
         rows = beside(span, dictionary.rows[entries].astype(np.float64).T)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import ClassVar, Self, TypeVar
@@ -219,6 +219,7 @@ class Fitted:
     movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
     starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
     log_likelihood: float  # Gaussian, of the valid rows.
+    _effects: dict[Term, tuple[Effect, ...]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def scale(self) -> FloatArray:
@@ -247,8 +248,14 @@ class Fitted:
         estimates: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
         for term in self.terms:
             number = sum(1 for key in estimates if key.rpartition(" ")[0] == term.kind_key)
-            estimates[f"{term.kind_key} {number}"] = (term, term.estimate(self))
+            estimates[f"{term.kind_key} {number}"] = (term, self.effects_of(term))
         return estimates
+
+    def effects_of(self, term: Term) -> tuple[Effect, ...]:
+        """What the profile gets for one of the terms."""
+        if term not in self._effects:
+            self._effects[term] = term.estimate(self)
+        return self._effects[term]
 
     def mean_part(self, term: Term) -> slice:
         """Where a term's coefficients of the mean are."""
@@ -278,6 +285,11 @@ def design_of(coarse: Coarse, terms: Sequence[Term]) -> tuple[FloatArray, FloatA
 
 def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
     """Fit all terms jointly: generalised least squares and the autoregression by turns."""
+    fitted: Fitted = coarse.once(tuple(terms), lambda: _fit(coarse, tuple(terms)))
+    return fitted
+
+
+def _fit(coarse: Coarse, terms: tuple[Term, ...]) -> Fitted:
     columns, scales, known = design_of(coarse, terms)
     valid, drive = coarse.valid, coarse.drive
     sizes, log_sizes, log_covariance = np.zeros(columns.shape[1]), np.zeros(scales.shape[1]), np.zeros((0, 0))

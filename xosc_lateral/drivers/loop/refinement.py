@@ -148,7 +148,10 @@ def lags_about(lag_s: float, reach: float, step: float) -> FloatArray:
 
 def running_sums(coarse: Coarse, quantity: FloatArray, response_s: float) -> FloatArray:
     """Of the response to a quantity on the fine grid, shape (fine n, k), from zero on: shape (fine n + 1, k)."""
-    return np.cumsum(np.pad(coarse.timeline.respond(quantity, 0.0, response_s), ((1, 0), (0, 0))), axis=0)
+    response = coarse.timeline.respond(quantity, 0.0, response_s)
+    sums = np.zeros((len(response) + 1, response.shape[1]))
+    np.cumsum(response, axis=0, out=sums[1:])
+    return sums
 
 
 def means_by_second(sums: FloatArray, late: int) -> FloatArray:

@@ -184,7 +184,7 @@ def _that_can_be_told(selection: Selection) -> Selection:
     for accepted in selection.accepted:
         alone = fit_model(selection.final.coarse, [*selection.start.terms, accepted.term])
         try:
-            accepted.term.describe(alone, accepted.term.estimate(alone), "")
+            accepted.term.describe(alone, alone.effects_of(accepted.term), "")
         except UNFORESEEN as error:
             selection = selection.without([accepted.term], failed("its description", error))
     return selection

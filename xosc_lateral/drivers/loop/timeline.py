@@ -6,7 +6,7 @@ seconds never brings in another drive's values.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -35,6 +35,8 @@ LOCAL_S = 20.0  # Movement slower than this counts as mean, faster as spread. [s
 # and the whole of a passing vehicle. [s]
 CLUSTER_S = 60
 MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
+FORGOTTEN = 1e-30  # Share of a start that no response shows. [-]
+KEPT_FITS = 16  # Of one table or fold: those that its effects are weighed by. [-]
 MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
 
 
@@ -158,10 +160,13 @@ def start_anew(
     response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
 ) -> FloatArray:
     """A first-order lag over drives in a row, settled anew where each starts: what is constant in drives stays so."""
-    _, starts, drive_number = np.unique(drive, return_index=True, return_inverse=True)
-    first = starts[drive_number]
-    left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
-    return np.asarray(response - (response - values)[first] * (left[:, None] if values.ndim == 2 else left))
+    begins = np.diff(drive, prepend=-1) > 0  # drives are in order
+    starts, number, rows = np.flatnonzero(begins), np.cumsum(begins) - 1, np.arange(len(values))
+    lasting = round(np.log(FORGOTTEN) / np.log(max(keep, FORGOTTEN))) + 1
+    left = np.append(keep ** np.arange(lasting).astype(values.dtype), values.dtype.type(0.0))
+    left = left[np.minimum(rows - starts[number], lasting)]
+    off = (response[starts] - values[starts])[number]
+    return np.asarray(response - off * (left[:, None] if values.ndim == 2 else left))
 
 
 def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
@@ -197,6 +202,7 @@ class Coarse:
     # cut out must not stretch a column's range.
     context: Mapping[str, FloatArray]
     _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
+    _fits: dict[tuple[object, ...], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, timeline: Timeline) -> Coarse:
@@ -219,7 +225,15 @@ class Coarse:
 
     def only(self, rows: BoolArray) -> Coarse:
         """The same with fewer valid rows; `rows`: shape (n,)."""
-        return replace(self, valid=self.valid & rows, _responses={})
+        return replace(self, valid=self.valid & rows, _responses={}, _fits={})
+
+    def once(self, terms: tuple[object, ...], fit: Callable[[], Any]) -> Any:
+        """A fit of these very terms to these rows, made once; the last few are kept."""
+        if terms not in self._fits:
+            self._fits[terms] = fit()
+            for old in list(self._fits)[:-KEPT_FITS]:
+                del self._fits[old]
+        return self._fits[terms]
 
     @cached_property
     def drives(self) -> int:
@@ -234,7 +248,7 @@ class Coarse:
         _, cluster = np.unique(self.drive * len(self) + minute, return_inverse=True)
         return cluster.astype(np.intp)
 
-    @property
+    @cached_property
     def lasts(self) -> bool:
         """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
         return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)

@@ -112,31 +112,41 @@ def recur(past: FloatArray, noise: FloatArray, coefficients: FloatArray) -> Floa
     return series.reshape(-1, *noise.shape[1:])
 
 
-def _convolve_body(values, kernel, result):  # type: ignore[no-untyped-def]
+def _convolve_body(values, kernel, paths, result):  # type: ignore[no-untyped-def]
+    # values side by side in `paths`, all flat, step by step
     taps = len(kernel)
     half = taps // 2
     block = 512  # stays in the first-level cache through all taps
     for first in range(0, len(result), block):
         last = min(first + block, len(result))
         out = result[first:last]
-        middle = values[first + half : last + half]
+        middle = values[first + half * paths : last + half * paths]
         for i in range(last - first):
             out[i] = kernel[half] * middle[i]
         k = 0
         while k + 4 <= half:  # four taps a pass spare three quarters of the stores
             w0, w1, w2, w3 = kernel[k], kernel[k + 1], kernel[k + 2], kernel[k + 3]
-            before = values[first + k : last + k + 3]
-            behind = values[first + taps - 4 - k : last + taps - 1 - k]
+            early, late = first + k * paths, first + (taps - 1 - k) * paths
+            a0, z0 = values[early : early + block], values[late : late + block]
+            a1, z1 = values[early + paths : early + paths + block], values[late - paths : late - paths + block]
+            a2, z2 = (
+                values[early + 2 * paths : early + 2 * paths + block],
+                values[late - 2 * paths : late - 2 * paths + block],
+            )
+            a3, z3 = (
+                values[early + 3 * paths : early + 3 * paths + block],
+                values[late - 3 * paths : late - 3 * paths + block],
+            )
             for i in range(last - first):  # slices, so that the compiler sees plain indices and vectorises
-                total = out[i] + w0 * (before[i] + behind[i + 3])
-                total += w1 * (before[i + 1] + behind[i + 2])
-                total += w2 * (before[i + 2] + behind[i + 1])
-                out[i] = total + w3 * (before[i + 3] + behind[i])
+                total = out[i] + w0 * (a0[i] + z0[i])
+                total += w1 * (a1[i] + z1[i])
+                total += w2 * (a2[i] + z2[i])
+                out[i] = total + w3 * (a3[i] + z3[i])
             k += 4
         while k < half:
             weight = kernel[k]
-            before = values[first + k : last + k]
-            behind = values[first + taps - 1 - k : last + taps - 1 - k]
+            early, late = first + k * paths, first + (taps - 1 - k) * paths
+            before, behind = values[early : early + block], values[late : late + block]
             for i in range(last - first):
                 out[i] += weight * (before[i] + behind[i])
             k += 1
@@ -151,10 +161,10 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
     Every result is the same sum in the same order, however the values are cut into pieces. Of shape (n,) or (n, k),
     through `taps` of them they are of shape (n - taps + 1,) or (n - taps + 1, k). [any unit]
     """
-    n = len(values) - len(kernel) + 1
-    if values.size == len(values) and worth_compiling(n):
-        result = np.empty(n)
-        _convolve_compiled()(values.ravel(), kernel, result)
+    n, paths = len(values) - len(kernel) + 1, values.size // max(len(values), 1)
+    if worth_compiling(n * paths):
+        result = np.empty(n * paths)
+        _convolve_compiled()(values.ravel(), kernel, paths, result)
         return result.reshape(n, *values.shape[1:])
     half, rows = len(kernel) // 2, max(1, CACHED * len(values) // max(values.size, 1))
     result = np.asarray(kernel[half] * values[half : half + n])

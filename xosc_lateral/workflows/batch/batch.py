@@ -19,6 +19,7 @@ from xosc_lateral.base.signals import deferring_signals
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.files.atomic import files_of_run, temporary_files
 from xosc_lateral.files.output_paths import label_files
+from xosc_lateral.files.remote import address
 from xosc_lateral.files.source import file_hash, file_state
 from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
@@ -151,7 +152,9 @@ def _outcomes(
                     outcome = _noted(job, reply, journal, todo[job.name][1])
                     failed |= {job.output.parent} if outcome.row.error else set()
                     yield outcome
-        if batch.shard:
+        if batch.shard and address(batch.folder):
+            pass  # there are no locks: the journal stays for the run of the whole that ends the batch
+        elif batch.shard:
             with whole_folder(batch.folder) as run:
                 whole = Journal(batch.folder, batch.folder / STATE_FOLDER / "journal.jsonl", notify)
                 whole.take_over(journal)

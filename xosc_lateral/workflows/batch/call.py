@@ -17,7 +17,7 @@ from xosc_lateral.base.names import in_terminal
 from xosc_lateral.base.note import Note, notes
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.files.output_paths import claim, output_folder
-from xosc_lateral.files.remote import is_url
+from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState, remove_empty, whole_folder
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
 from xosc_lateral.workflows.batch.guard import JobLimits
@@ -28,6 +28,7 @@ from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
+from xosc_lateral.workflows.inputs import scenarios_at
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 
@@ -72,17 +73,18 @@ def convert_many(
     Parameters
     ----------
     scenarios : str, Path, DataFrame, or sequence of paths
-        A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
-        if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
+        A file, a folder (searched to the bottom), a glob, a URL (``s3://...``, through fsspec), a table (CSV, Parquet)
+        or frame with a column `scenario` and if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of
+        options; or several of them.
     output : str or Path
-        Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
+        Folder or URL; it mirrors the inputs, and holds `manifest.parquet` at the end.
     report : str or Path, optional
         Folder for a page per output, and an ``index.html`` that lists what needs attention first.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
     shard : str
         "2/8": the second of eight parts, which may run at the same time, on other machines with the same folder; a part
-        that was killed is run again, or the whole without `shard`.
+        that was killed is run again, or the whole without `shard`, as ends parts that write to a URL.
     keep_old : bool
         Leave outputs as they are whose inputs, settings or program have changed since; they count as stale.
     force : bool
@@ -106,43 +108,46 @@ def convert_many(
         inputs = list(scenarios)
     else:
         inputs = list(read_request_table(scenarios, settings, variants=variants))
-    for place in (*inputs, output):
-        if is_url(place):
-            raise FormatError("a batch needs a folder: mount the bucket; one scenario goes without", path=place)
     number, parts = (1, 1) if shard is None else read_shard(shard)
-    whole = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report, labels=labels)
-    if not len(whole):
-        raise FormatError(f"no scenario to convert{_left_out(whole)}", path=", ".join(map(str, inputs[:3])) or output)
-    batch = whole if shard is None else whole.part(number, parts)
-    _refuse_unknown_names(whole)
-    # A folder in an output's place is that output's failure alone.
-    claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
-    outcomes = outcomes_of(
-        batch,
-        workers=workers,
-        cluster=cluster,
-        keep_old=keep_old,
-        limits=JobLimits(job_timeout, job_memory),
-        notify=None
-        if show == "nothing"
-        else lambda line: print(in_terminal(f"xosc-lateral: {line}"), file=sys.stderr, flush=True),
-    )
+    if cluster is not None and any(map(is_url, (*inputs, output))):
+        raise FormatError("workers of a cluster see paths alone; parts of a batch need none: --shard", path=output)
+    here = [path for one in inputs for path in (scenarios_at(one) if is_url(one) else [one])]
+    with sent_back(output, report) as (written, pages):
+        folder = output_folder(written)
+        whole = plan_batch(here, folder, settings, variants=variants, report=pages, labels=labels)
+        if not len(whole):
+            named = ", ".join(map(str, inputs[:3]))
+            raise FormatError(f"no scenario to convert{_left_out(whole)}", path=named or output)
+        batch = whole if shard is None else whole.part(number, parts)
+        _refuse_unknown_names(whole)
+        # A folder in an output's place is that output's failure alone.
+        claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
+        outcomes = outcomes_of(
+            batch,
+            workers=workers,
+            cluster=cluster,
+            keep_old=keep_old,
+            limits=JobLimits(job_timeout, job_memory),
+            notify=None
+            if show == "nothing"
+            else lambda line: print(in_terminal(f"xosc-lateral: {line}"), file=sys.stderr, flush=True),
+        )
 
-    def report_row(outcome: JobOutcome) -> None:
-        if on_outcome is not None:
-            on_outcome(_row(outcome.state, outcome.seconds, outcome.row))
+        def report_row(outcome: JobOutcome) -> None:
+            if on_outcome is not None:
+                on_outcome(_row(outcome.state, outcome.seconds, outcome.row))
 
-    try:
-        summary = follow(outcomes, len(batch), Display(show), report=report_row)
-    except Interrupted as signal:
-        signal.finished = sum(job.output.is_file() for job in batch.jobs)
-        raise
-    index = None
-    if report is not None:  # whichever part ends last has all of them
-        with nullcontext() if shard is None else whole_folder(batch.folder):
-            index = write_batch_index(whole, Path(report))
-        remove_empty([batch.folder / STATE_FOLDER])
-    return BatchResult(batch, summary, index)
+        try:
+            summary = follow(outcomes, len(batch), Display(show), report=report_row)
+        except Interrupted as signal:
+            signal.finished = sum(job.output.is_file() for job in batch.jobs)
+            raise
+        index = None
+        if pages is not None and not (shard and address(folder)):  # whichever part ends last has all of them
+            with nullcontext() if shard is None else whole_folder(batch.folder):
+                index = write_batch_index(whole, Path(pages))
+            remove_empty([batch.folder / STATE_FOLDER])
+        return BatchResult(batch, summary, index)
 
 
 def read_shard(text: str) -> tuple[int, int]:
@@ -214,7 +219,7 @@ class BatchResult(Result):
 
     def headline(self) -> str:
         """One line."""
-        return f"{self.folder}: {self._summary.text()}"
+        return f"{address(self.folder) or self.folder}: {self._summary.text()}"
 
     def __str__(self) -> str:
         report = [] if self.report is None else [f"report: {self.report}"]
@@ -241,7 +246,7 @@ class BatchResult(Result):
     def totals(self) -> dict[str, Any]:
         """Plain values of the whole batch: the last line that ``--json`` prints."""
         return {
-            "folder": str(self.folder),
+            "folder": address(self.folder) or str(self.folder),
             "left_out": len(self._batch.left_out),
             "notes": list(self.notes),
             **self._summary.to_dict(),

@@ -20,7 +20,7 @@ GAP_COLUMNS = ("smallest gap, nominal [m]", "smallest gap, enriched [m]")
 
 _PLACE = re.compile(r"^(\S+\.\w+(:\d+)?: )+")
 """Begins a message: files, with or without a line."""
-_VALUE = re.compile(r"'[^']*'|\"[^\"]*\"|(?<![\w.])-?\d+(\.\d+)?")
+_VALUE = re.compile(r"(?<=[\s(])(?:[a-zA-Z][\w+.-]*:)?[/\\][^\s)]+|'[^']*'|\"[^\"]*\"|(?<![\w.])-?\d+(\.\d+)?")
 _ANY = "…"
 
 

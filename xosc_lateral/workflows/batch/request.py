@@ -20,9 +20,11 @@ from xosc_lateral.base.limits import PARAMETER_SETS, XML_TREE
 from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.provenance import HEADER_MARK
 from xosc_lateral.files.output_paths import file_name
+from xosc_lateral.files.remote import is_url
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
+from xosc_lateral.workflows.inputs import scenarios_at
 from xosc_lateral.workflows.options import Option, as_it_is, whole_number
 
 if TYPE_CHECKING:
@@ -175,7 +177,8 @@ def read_request_table(rows: Path | pd.DataFrame, settings: ConvertSettings, *, 
             name = file_name(cells["name"], "name") if "name" in cells else ""
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
-        yield Request(folder / scenario, row_settings, rows_variants, base, label=_label(cells), name=name)
+        (place,) = scenarios_at(scenario if is_url(scenario) else folder / scenario)
+        yield Request(place, row_settings, rows_variants, base, label=_label(cells), name=name)
 
 
 def _label(cells: Mapping[str, str]) -> str:

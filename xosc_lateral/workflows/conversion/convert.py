@@ -18,10 +18,10 @@ from xosc_lateral.base.note import warnings
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
-from xosc_lateral.files.held import exists, held_at
+from xosc_lateral.files.held import exists
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.remote import is_url, open_url
+from xosc_lateral.files.remote import leads_from, sent_back
 from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
@@ -84,28 +84,24 @@ def convert(
     if variant < 1:
         raise ValueError(f"variant {variant}, they count from 1")
     inputs = scenario_input(scenario, options.pop("road", None))
-    settings = ConvertSettings.of(**options, road=inputs.road)
-    source, url = inputs.path, output if isinstance(output, str) and is_url(output) else ""
-    output = None if url else output
-    # without an output, file references in the bytes are as from the source's folder
-    target = source if output is None else output_scenario(output, source)
-    page = None if report is None else output_file(report, f"{target.stem}.html", PAGE_SUFFIXES)
-    claim([None if output is None else target, page], [source], force=force)
-    with together():
-        conversion = convert_scenario(
-            source,
-            target,
-            settings,
-            variant_index=variant - 1,
-            report=page,
-            saves=output is not None,
-        )
-        conversion.held = inputs.held
-        if url:
-            with open_url(url, "wb") as file:
-                file.write(conversion.data)
-        if page is not None:
-            conversion.write_report(page, force=force)
+    settings, source = ConvertSettings.of(**options, road=inputs.road), inputs.path
+    with sent_back(output, report) as (written, shown):
+        # without an output, file references in the bytes are as from the source's folder
+        target = source if written is None else output_scenario(written, source)
+        page = None if shown is None else output_file(shown, f"{target.stem}.html", PAGE_SUFFIXES)
+        claim([None if written is None else target, page], [source], force=force)
+        with together():
+            conversion = convert_scenario(
+                source,
+                target,
+                settings,
+                variant_index=variant - 1,
+                report=page,
+                saves=written is not None,
+            )
+            conversion.held = inputs.held
+            if page is not None:
+                conversion.write_report(page, force=force)
     return conversion
 
 
@@ -210,7 +206,7 @@ def check(plan: Plan, written: Written) -> Written:
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
         # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
-        place = plan.source if held_at(plan.source) else plan.output
+        place = leads_from(plan.source, plan.output)
         output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
         comparisons, run = source_meaning.compare(
             output, written.vehicles.trajectories, {path.entity for path in paths}, most=most

@@ -46,7 +46,7 @@ def conversion_page(conversion: ConvertedScenario) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes."""
     enriched = conversion.movement
     done = [entity for entity in enriched.entities if entity.is_enriched]
-    page = Page(f"{conversion.source.name}: lateral movement added")
+    page = Page(f"{conversion.source.name}: {'lateral movement added' if done else 'no movement added'}")
     page.lead(
         (
             f"{len(done)} of {len(enriched.entities)} entities now move inside their lanes as the chosen drivers do; "
@@ -54,11 +54,11 @@ def conversion_page(conversion: ConvertedScenario) -> str:
             if done
             else "No entity was enriched; the reasons are listed below."
         )
-        + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by}). "
-        f"The result is in `{(conversion.output or conversion.source).name}`."
+        + f" The scenario runs for {enriched.motion.end_time:.1f} s (ended by the {enriched.motion.ended_by})."
+        + ("" if conversion.output is None else f" The result is in `{conversion.output.name}`.")
     )
     page.key_figures(key_figures(enriched, done))
-    page.lead(conversion.under_test)
+    page.lead(conversion.under_test[:1].upper() + conversion.under_test[1:])
     for warning in conversion.warnings:
         page.warning(warning)
     page.section(

@@ -14,6 +14,7 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.note import Note, Telling, warnings
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.plausibility import Bound
@@ -145,7 +146,7 @@ def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) ->
 
 
 def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:
-    return np.gradient(values, time[1] - time[0]) if len(time) > 2 else np.zeros_like(values)
+    return rate(values, float(time[1] - time[0])) if len(time) > 2 else np.zeros_like(values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from msgspec import Struct
 
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.note import Note
+from xosc_lateral.base.rates import rate
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
@@ -204,7 +205,7 @@ class _Shifts:
         row = int(np.searchsorted(entity.time, now.start + 1e-9, side="right")) - 1
         if row < 1 or entity.lane[row] != entity.lane[row - 1]:
             return 0.0
-        return float(abs(entity.offset[row] - entity.offset[row - 1]) / (entity.time[row] - entity.time[row - 1]))
+        return abs(float(rate(entity.offset[row - 1 : row + 1], entity.time[row - 1 : row + 1])[0]))
 
     def _is_over(self, played: PlayedAction, run: int) -> bool:
         """Before its run is: what the run's end cuts has no end of its own."""

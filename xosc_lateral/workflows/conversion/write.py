@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import BEHAVIOUR, __version__
-from xosc_lateral.files.held import held_at
 from xosc_lateral.files.openscenario.provenance import PENDING_HASH
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.files.remote import leads_from
 from xosc_lateral.workflows.conversion.phases import paths_of
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift
@@ -47,7 +47,7 @@ def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
     `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can.
     """
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
-    place = plan.source.parent if held_at(plan.source) else plan.output.parent
+    place = leads_from(plan.source, plan.output).parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
     provenance = ConversionProvenance(
         package_version=__version__,

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rates import rate
+from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW
 from xosc_lateral.drivers.model.seeds import of_name
 from xosc_lateral.workflows.detection.band import Band
-from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, Truth, truth_of
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Rows, Scene, Truth, truth_of
 
-RATE_WINDOW = 0.5
-"""Lateral speed is the change of position over the last so many seconds, lateral acceleration that of the lateral
-speed: what is known of one second, as a tracker knows it. [s]"""
+# Lateral speed is the change of position over the last `RATE_WINDOW`, lateral acceleration that of the lateral speed:
+# what is known of one second, as a tracker knows it.
 WATCHED_DISTANCE = 150.0
 """Vehicles farther ahead are not watched: 5 s at 30 m/s, as in `recordings.encounters`. [m]"""
-CARRIAGEWAY_DISTANCE = 30.0
-"""Vehicles of different roads farther apart across are on other carriageways. [m]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +90,8 @@ def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measu
     if sensor.noise > 0.0:
         position = position + sensor.noise * rng.standard_normal(len(track))
     lateral = position[taken]
-    speed = _change(lateral)
-    return Measured(taken, lateral - track.base[taken], speed, _change(speed))
-
-
-def _change(values: FloatArray) -> FloatArray:
-    """Change over the last `RATE_WINDOW`, a second; shape as the argument."""
-    rows = round(RATE_WINDOW / STEP)
-    return np.asarray((values - values[np.maximum(np.arange(len(values)) - rows, 0)]) / RATE_WINDOW)
+    speed = rate(lateral, STEP, RATE_WINDOW, past=True)
+    return Measured(taken, lateral - track.base[taken], speed, rate(speed, STEP, RATE_WINDOW, past=True))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,8 +142,8 @@ class View:
 def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = True) -> list[View]:
     """Every vehicle but the ego, from both sides where it is ever watched from there."""
     root = (seed, of_name(scene.name))
-    several = len({track.name for track in scene.tracks}) > 1
-    views = []
+    several, views = len({track.name for track in scene.tracks}) > 1, []
+    rows = Rows(scene) if scene.ego is not None or (with_observers and several) else None
     for number, track in enumerate(scene.tracks):
         if track.name == scene.ego:
             continue
@@ -158,8 +151,8 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
         measured = measure(track, sensor, np.random.default_rng((*root, number)))
         for side in (1, -1):
             watched, observer = track.has_lane(side), None
-            if scene.ego is not None or (with_observers and several):
-                observer = _observer(scene, track, side, measured.taken)
+            if rows is not None:
+                observer = _observer(rows, number, side, measured.taken)
             if scene.ego is not None:
                 assert observer is not None
                 watched = watched & np.isfinite(observer.gap)
@@ -168,42 +161,20 @@ def views_of(scene: Scene, sensor: Sensor, seed: int, *, with_observers: bool = 
     return views
 
 
-def _observer(scene: Scene, track: LaneTrack, side: int, taken: IntArray) -> Observer:
+def _observer(rows: Rows, number: int, side: int, taken: IntArray) -> Observer:
     """The ego where it is in the next lane, not ahead; else the nearest vehicle behind in that lane."""
-    n = len(track)
-    nearest = np.full(n, np.inf)
-    values = np.full((5, n), np.nan)
-    for other, mine, theirs in _together(scene, track):
-        a, b = track, other
-        dx, dy = a.x[mine] - b.x[theirs], a.y[mine] - b.y[theirs]
-        cos, sin = np.cos(b.heading[theirs]), np.sin(b.heading[theirs])
-        ahead = dx * cos + dy * sin + track.box.center_x - other.box.center_x
-        across = np.abs(dy * cos - dx * sin)
-        lengths = 0.5 * (track.box.length + other.box.length)
-        same_way = np.cos(a.heading[mine] - b.heading[theirs]) > 0.5
-        beside = b.lane_index[theirs] - a.lane_index[mine] == side
-        near = (a.road[mine] == b.road[theirs]) | (across < CARRIAGEWAY_DISTANCE)
-        better = same_way & beside & near & (ahead > -lengths) & (ahead < np.minimum(nearest[mine], WATCHED_DISTANCE))
-        rows = np.flatnonzero(better)
-        at = mine.start + rows
-        nearest[at] = ahead[rows]
-        widths = 0.5 * (a.lane_width[mine] + b.lane_width[theirs])
-        apart = widths - side * (a.offset[mine] - b.offset[theirs]) - 0.5 * (track.box.width + other.box.width)
-        speed = b.speed[theirs]
-        columns = ahead - lengths, speed - a.speed[mine], apart, speed, np.full(len(speed), other.box.length)
-        values[:, at] = np.array(columns)[:, rows]
+    track, mine = rows.tracks[number], slice(rows.begin[number], rows.begin[number + 1])
+    box, a = track.box, {name: values[mine] for name, values in rows.columns.items()}
+    nearest, values = np.full(len(track), np.inf), np.full((5, len(track)), np.nan)
+    for others in rows.beside(number, side):
+        b = {name: of_all[others] for name, of_all in rows.columns.items()}
+        dx, dy, cos, sin = a["x"] - b["x"], a["y"] - b["y"], np.cos(b["heading"]), np.sin(b["heading"])
+        ahead = dx * cos + dy * sin + box.center_x - b["center_x"]
+        lengths = 0.5 * (box.length + b["length"])
+        better = (others >= 0) & (ahead > -lengths) & (ahead < np.minimum(nearest, WATCHED_DISTANCE))
+        nearest[better] = ahead[better]
+        widths = 0.5 * (a["lane_width"] + b["lane_width"])
+        apart = widths - side * (a["offset"] - b["offset"]) - 0.5 * (box.width + b["width"])
+        columns = ahead - lengths, b["speed"] - a["speed"], apart, b["speed"], b["length"]
+        values[:, better] = np.array(columns)[:, better]
     return Observer(*values[:, taken])
-
-
-def _together(scene: Scene, track: LaneTrack) -> Iterator[tuple[LaneTrack, slice, slice]]:
-    """Tracks that exist at the same time, the ego's alone if there is one, with the rows of both."""
-    for other in scene.tracks:
-        if other is not track and scene.ego in (None, other.name):
-            first = max(track.first, other.first)
-            last = min(track.first + len(track), other.first + len(other))
-            if last > first:
-                yield (
-                    other,
-                    slice(first - track.first, last - track.first),
-                    slice(first - other.first, last - other.first),
-                )

@@ -32,7 +32,7 @@ def detection_page(
     """HTML page, self-contained; same input, same bytes."""
     page = Page("Cut-in detectors")
     telling = _telling(curves)
-    page.lead(lead[0], *([finding(telling)] if telling else []))
+    page.lead(*([finding(telling)] if telling else []), lead[0])
     if telling:
         page.section("Finding")
         page.figure(

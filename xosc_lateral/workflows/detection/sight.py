@@ -16,10 +16,9 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.detection.observation import CARRIAGEWAY_DISTANCE
 from xosc_lateral.workflows.detection.scoring import INTERVAL_SHARES, RESAMPLES
 from xosc_lateral.workflows.detection.sources import Source, checked
-from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene
+from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Rows, Scene
 from xosc_lateral.workflows.detection.visibility import Boxes, points_seen, visible_share
 from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
 
@@ -51,28 +50,30 @@ class Moment:
 
 def moments_of(scene: Scene) -> Iterator[Moment]:
     """Of every vehicle, or of the ego alone, at every whole second."""
-    if not all({"x", "lane_index"} <= track.columns.keys() for track in scene.tracks):
+    if not all({"x", "line"} <= track.columns.keys() for track in scene.tracks):
         return
     first = min((track.first for track in scene.tracks), default=0)
     last = max((track.first + len(track) for track in scene.tracks), default=0)
     farthest = max(far for _, far in SENSORS.values())
+    rows = Rows(scene) if len(scene.tracks) > 2 else None
     for instant in range(first + -first % MOMENT_ROWS, last, MOMENT_ROWS):
         there = [track for track in scene.tracks if track.first <= instant < track.first + len(track)]
-        if len(there) < 3:
+        if rows is None or len(there) < 3:
             continue
         state = np.array([_state(track, instant - track.first) for track in there]).T
-        boxes, x, y, heading, lane, offset, along, road = Boxes(*state[:5]), *state[5:]
+        boxes, x, y, heading, offset, along = Boxes(*state[:5]), *state[5:]
+        row_of = [rows.begin[k] + instant - track.first for k, track in enumerate(scene.tracks) if track in there]
         for number, track in enumerate(there):
             if scene.ego not in (None, track.name):
                 continue
             cos, sin = np.cos(heading[number]), np.sin(heading[number])
             dx, dy = boxes.x - boxes.x[number], boxes.y - boxes.y[number]
-            ahead, across = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
-            near = (road == road[number]) | (across < CARRIAGEWAY_DISTANCE)
-            same = (lane == lane[number]) & near & (np.cos(heading - heading[number]) > 0.5) & (ahead > 0.0)
-            in_lane = np.flatnonzero(same)[np.argsort(ahead[same])][:2]
-            if len(in_lane) < 2:
+            ahead = dx * cos + dy * sin
+            next_row = rows.ahead(row_of[number])
+            second_row = rows.ahead(next_row) if next_row >= 0 else -1
+            if second_row < 0:
                 continue
+            in_lane = np.array([row_of.index(next_row), row_of.index(second_row)])
             gap, distance = ahead[in_lane] - 0.5 * (boxes.length[in_lane] + boxes.length[number])
             if distance > farthest or gap <= 0.0:
                 continue
@@ -95,8 +96,7 @@ def _state(track: LaneTrack, row: int) -> list[float]:
     middle = x + box.center_x * cos - box.center_y * sin, y + box.center_x * sin + box.center_y * cos
     along = heading - relative
     return [
-        *middle, heading, box.length, box.width, x, y, heading, float(track.lane_index[row]), float(track.offset[row]),
-        along, float(track.road[row]),
+        *middle, heading, box.length, box.width, x, y, heading, float(track.offset[row]), along,
     ]  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.detection.tracks import STEP, LaneTrack, Scene, in_lanes, tracks_of
 from xosc_lateral.workflows.recordings.importers.track_table import USUAL_LENGTH
+from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 from xosc_lateral.workflows.recordings.recorded import place_tracks
 from xosc_lateral.workflows.recordings.recordings import (
     REAR_AXLE,
@@ -164,11 +165,11 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
         ego = next(iter(chosen_egos(played.scenario, ConvertSettings())), "none")
     elif ego != "none" and ego not in {entity.name for entity in vehicles}:
         raise FormatError(f"has no vehicle {ego!r} to be the ego", path=played.scenario.path)
-    tracks = list[LaneTrack]()
+    tracks, lanes = list[LaneTrack](), RoadLanes(played.network)
     for entity in vehicles:
         there = np.flatnonzero(((entity.activity & Activity.ACTIVE) != 0) & (entity.road >= 0))
         if len(there) > 1:
-            tracks += tracks_of(in_lanes(entity.at(there), played.network), cluster=f"{cluster or name}:{entity.name}")
+            tracks += tracks_of(in_lanes(entity.at(there), lanes), cluster=f"{cluster or name}:{entity.name}")
     names = tuple(entity.name for entity in played.motion.entities)
     return Scene(name, tuple(tracks), None if ego == "none" else ego, played.network, names)
 
@@ -186,9 +187,9 @@ def _scene_of(traffic: RecordedTraffic, path: Path, settings: SourceSettings) ->
     ego = None if settings.ego == "none" else settings.ego
     if ego is not None and ego not in {vehicle.name for vehicle in recording.vehicles}:
         raise FormatError(f"has no vehicle {ego!r} to be the ego", path=path)
-    tracks = list[LaneTrack]()
+    tracks, lanes = list[LaneTrack](), RoadLanes(traffic.network)
     for vehicle in recording.vehicles:
-        motion = in_lanes(vehicle, traffic.network)
+        motion = in_lanes(vehicle, lanes)
         motion = motion.having(following=motion.following & (vehicle.way() > 0))
         tracks += tracks_of(motion, cluster=vehicle.name)
     name = f"{traffic.name} {traffic.label}" if traffic.label else traffic.name

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.track import Column, lane_levels
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course
 from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS
+from xosc_lateral.workflows.recordings.lane_graph import Order, RoadLanes, in_groups
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.segments import ACROSS_LANE
 from xosc_lateral.world.road.network import RoadNetwork
@@ -33,6 +35,11 @@ class LaneTrack(EntityMotion):
     lateral = Column(np.float64, "m")  # from the centre of the first row's lane, through lane changes, positive left
     base = Column(np.float64, "m", "nearest")  # the same of the centre of each row's lane
     level = Column(np.int64, "", "nearest")  # lanes to the left of the first row's lane
+    # where it is among others, see `RoadLanes.stations`
+    line = Column(np.int64, "", "nearest")
+    rank = Column(np.int64, "", "nearest")
+    station = Column(np.float64, "m")  # of its middle
+    jump = Column(np.float64, "m", "nearest")  # of stations, from those of its first line
 
     @property
     def first(self) -> int:
@@ -63,12 +70,20 @@ def tracks_of(motion: EntityMotion, *, cluster: str, cuts: Sequence[int] = ()) -
     for piece in motion.pieces(MAX_GAP, cuts):
         if len(piece) > 1 and piece.time[-1] - piece.time[0] >= MIN_DURATION:
             base, level = lane_levels(piece.offset, piece.lane_width)
-            even = piece.having(lateral=piece.offset + base, base=base, level=level).every(STEP)
+            piece = piece.having(lateral=piece.offset + base, base=base, level=level)
+            if "line" in piece.columns:
+                line, station = piece.columns["line"], piece.columns["station"]
+                new = np.r_[False, np.diff(line) != 0]
+                jump = np.cumsum(np.where(new, np.diff(station, prepend=station[:1]), 0.0))
+                piece = piece.having(station=station - jump, jump=jump)
+            even = piece.every(STEP)
             yield LaneTrack(even.name, even.time, even.columns, even.breaks, even.entity, cluster)
 
 
-def in_lanes(motion: EntityMotion, network: RoadNetwork) -> EntityMotion:
-    """With what the road is like where it is."""
+def in_lanes(motion: EntityMotion, lanes: RoadLanes) -> EntityMotion:
+    """With what the road is like where it is, and its place among others."""
+    network, way = lanes.network, motion.way()
+    line, rank, station = lanes.stations(motion.road, motion.lane, motion.s, way)
     index, count = network.lane_index(motion.road, motion.lane, motion.s)
     along = np.abs(np.sin(motion.heading_relative)) < np.sin(ACROSS_LANE)
     return motion.having(
@@ -76,7 +91,45 @@ def in_lanes(motion: EntityMotion, network: RoadNetwork) -> EntityMotion:
         lane_index=index.astype(np.float64),
         lane_count=count.astype(np.float64),
         following=along & (index >= 0) & (motion.speed >= MINIMUM_SPEED * (1.0 - 1e-6)),
+        line=line,
+        rank=rank,
+        station=station + motion.box.center_x,
     )
+
+
+class Rows:
+    """All rows of a scene's tracks, one track after the other, and who is next to whom."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.tracks = scene.tracks
+        self.begin = np.cumsum([0, *map(len, self.tracks)])
+        instant = np.concatenate([track.first + np.arange(len(track)) for track in self.tracks])
+        line, rank = (np.concatenate([track.columns[name] for track in self.tracks]) for name in ("line", "rank"))
+        frame = np.where(line >= 0, (instant - instant.min()) * (int(line.max()) + 1) + line, -1)
+        self.group, self.station = in_groups(frame, rank - rank.min()), self.of("station") + self.of("jump")
+        is_seen = [scene.ego in (None, track.name) for track in self.tracks]
+        names = ("x", "y", "heading", "speed", "offset", "lane_width")
+        self.columns = {name: self.of(name) for name in names}
+        for name in ("length", "width", "center_x"):
+            self.columns[name] = np.repeat([getattr(track.box, name) for track in self.tracks], np.diff(self.begin))
+        self._everybody = Order(self.group, self.station)
+        self._seen = Order(np.where(np.repeat(is_seen, np.diff(self.begin)), self.group, -1), self.station)
+
+    def of(self, column: str) -> FloatArray:
+        """A column of all."""
+        return np.concatenate([track.columns[column] for track in self.tracks])
+
+    def ahead(self, row: int) -> int:
+        """Row of who is next ahead in the same lane; -1: nobody."""
+        own = slice(row, row + 1)
+        return int(self._everybody.next_to(self.group[own], self.station[own], is_ahead=True)[0])
+
+    def beside(self, number: int, side: int) -> list[IntArray]:
+        """Rows of the vehicles, with an ego of it alone, that are next ahead and not ahead of a track, row by row, in
+        the lane on a side of it; -1: nobody."""
+        rows = slice(self.begin[number], self.begin[number + 1])
+        group = np.where(self.group[rows] >= 0, self.group[rows] + side, -1)
+        return [self._seen.next_to(group, self.station[rows], is_ahead=is_ahead) for is_ahead in (True, False)]
 
 
 # ---- what truly happens ----
@@ -136,5 +189,5 @@ STILL_SPEED = 0.01
 
 def moves_in_lane(track: LaneTrack, truth: Truth) -> bool:
     """Whether a vehicle moves sideways while it keeps its lane."""
-    rate = np.abs(np.diff(track.offset, prepend=track.offset[:1])) / STEP
-    return bool((rate[truth.keeping] > STILL_SPEED).any())
+    speed = np.abs(rate(track.offset, STEP, past=True))
+    return bool((speed[truth.keeping] > STILL_SPEED).any())

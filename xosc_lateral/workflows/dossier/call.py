@@ -202,6 +202,7 @@ class Dossier(Result):
             "parts": {name: [list(row) for row in rows] for name, rows in self.parts.items()},
             "anomalies": known_anomalies(),
             "tool_classification": self._contents.tool,
+            "process": self._contents.process,
             "versions": dict(self.versions),
         }
 

@@ -41,12 +41,14 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 class Contents(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a dossier says; `clauses`: part -> what it answers; `tool`: uses, what can go wrong, and what finds it."""
+    """What a dossier says; `clauses`: part -> what it answers; `tool`: uses, what can go wrong, and what finds it;
+    `process`: what else an assessor asks for, and the answer."""
 
     purpose: str = ""
     clauses: dict[str, list[str]] = {}
     claim: list[Claim] = []
     tool: list[dict[str, str]] = []
+    process: list[dict[str, str]] = []
 
 
 class State(StrEnum):

@@ -65,10 +65,12 @@ class ProfileBench:
         with TemporaryDirectory() as folder:
             for name in TEMPLATES:
                 write_template(name, Path(folder) / "templates")
-            path = Path(folder) / "profile.json"
-            write_profile(self.profile, path)
-            sources, profiles = Path(folder) / "templates", (str(path),)
-            return cast("Detection", detect(sources, ego="none", variants=DETECTED_VARIANTS, profiles=profiles))
+            library, name = Path(folder) / "library", self.profile.name
+            library.mkdir()
+            write_profile(self.profile, library / f"{name}.json")
+            sources, variants = Path(folder) / "templates", DETECTED_VARIANTS
+            found = detect(sources, ego="none", variants=variants, profiles=(name,), library=(library,))
+            return cast("Detection", found)
 
 
 def _differing_outputs(bench: ProfileBench) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone, inline
-from xosc_lateral.workflows.dossier.claims import Contents, Finding, State, known_anomalies
+from xosc_lateral.workflows.dossier.claims import Contents, Finding, State, known_anomalies, summary_of
 
 TITLES = {
     "validity": "Validity by frequency, speed, lane width, road",
@@ -26,7 +26,7 @@ def dossier_page(
 ) -> str:
     """HTML; equal values, equal bytes. `parts`: what is known besides the claims, by part."""
     page = Page(f"Dossier: {subject}")
-    page.lead(contents.purpose)
+    page.lead(f"{len(findings)} claims: {summary_of(findings)}.")
     counts = {state: sum(finding.state is state for finding in findings) for state in State}
     tones: dict[State, Tone] = {State.BROKEN: "bad"} if counts[State.BROKEN] else {State.HOLDS: "good"}
     page.key_figures(KeyFigure(count, str(state), tone=tones.get(state, "")) for state, count in counts.items())
@@ -52,6 +52,8 @@ def dossier_page(
         "named is part of it, and its result is looked at."
     )
     page.table(contents.tool)
+    begin("process", "Documentation, process and people")
+    page.table(contents.process)
     begin("versions", "Versions and hashes")
     page.table([{"": name, "version": words} for name, words in versions.items()])
     return page.html({"subject": subject, "versions": dict(versions)})

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.note import Note
+from xosc_lateral.base.rates import rate
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -225,7 +226,7 @@ def lane_changes_over_time(enriched: Enriched, chosen: Sequence[tuple[EntityResu
         panel.band(time[rows], PEAK_SPEEDS[0], PEAK_SPEEDS[1], SHADE)
         for added, style in ((0.0, {"dashes": DASHED}), (entity.deviation[rows], {})):
             color = color_of(_number_of(enriched, entity)) if not style else NOMINAL
-            panel.line(time[rows], side * np.gradient(way + added, time[rows]), color, **style)
+            panel.line(time[rows], side * rate(way + added, time[rows]), color, **style)
         panel.title, panel.x.label = label_of(entity.name), "time [s]"
     figure.panels[0].y.label = "across [m/s]"
     return figure

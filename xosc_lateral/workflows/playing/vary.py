@@ -20,7 +20,6 @@ from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
 from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LONGITUDINAL, LaneChangeAction
-from xosc_lateral.world.surroundings.ahead import vehicle_ahead
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
@@ -198,10 +197,13 @@ def _free_name(wanted: str, taken: set[str]) -> str:
 
 def _weights(action: PlayedAction, vehicle: EntityMotion, row: int, played: Played, maneuvers: Maneuvers) -> FloatArray:
     """Of the profile's rows, by what the scenario's vehicle does in the row in which it begins to change lanes."""
+    from xosc_lateral.workflows.recordings.encounters import vehicle_ahead
+    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
+
     end = float(vehicle.time[-1]) if action.end is None else action.end
     width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
     left = leads_left(vehicle, played.network, action.start, end)
-    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, played.network)
+    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, RoadLanes(played.network))
     return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width, gap=gap)
 
 

@@ -149,11 +149,14 @@ class Health(Result):
         from xosc_lateral.files.profiles import describe_profile
 
         lines = [f"a profile, {line}" for line in describe_profile(self.profile).splitlines()[1:2]]
-        if self.profile.sensor is not None:
-            lines.append(self.profile.sensor.in_words())
         if self.profile.effects:
             lines.append(f"effects of {', '.join(self.profile.columns)}")
         return lines
+
+    @property
+    def sensor(self) -> str:
+        """What of the offsets is the sensor's, in a line; empty: not known."""
+        return "" if self.profile is None or self.profile.sensor is None else self.profile.sensor.in_words()
 
     def cannot(self) -> list[str]:
         """What can't, and why, a line each."""
@@ -174,15 +177,16 @@ class Health(Result):
 
     def __str__(self) -> str:
         names = [
-            f"  {row['column']} = {row['in the table']} [{row['unit']}]  {row['seen']}"
+            f"  {row['column']} = {row['in the table'].removesuffix(in_unit).rstrip()}{in_unit}  {row['seen']}"
             + ("" if row["median"] is None else f"; {row['5 %']:.4g} to {row['95 %']:.4g}") for row in self.columns
+            for in_unit in [f" [{row['unit']}]"]
         ]  # fmt: skip
         left_out = [f"rows left out: {count} {why}" for why, count in self.figures.get("left_out", {}).items()]
         return "\n".join(
             [
                 self.headline(), *(f"wrong: {what}" for what in self.wrong[self.read is None :]), "columns:", *names,
                 *([f"  others: {', '.join(self.others)}"] if self.others else []), *left_out,
-                *(f"can be fitted: {line}" for line in self.can()),
+                *([self.sensor] if self.sensor else []), *(f"can be fitted: {line}" for line in self.can()),
                 *(f"can't be fitted: {line}" for line in self.cannot()),
             ]
         )  # fmt: skip
@@ -197,8 +201,8 @@ class Health(Result):
             "files": [str(path) for path in self.files], "can_be_read": self.read is not None,
             "guessed": self.is_guessed, "wrong": list(self.wrong), "columns": list(map(dict, self.columns)),
             "others": list(self.others),
-            "summary": self.figures, "drives": self.drives, "can": self.can(), "cannot": self.cannot(),
-            "mapping": self.mapping,
+            "summary": self.figures, "drives": self.drives, "sensor": self.sensor,
+            "can": self.can(), "cannot": self.cannot(), "mapping": self.mapping,
         }  # fmt: skip
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:

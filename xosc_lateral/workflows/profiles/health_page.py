@@ -36,6 +36,8 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
         )
     for what in facts["wrong"]:
         page.warning(f"{what}." + (" With what is guessed below they can be read." if facts["guessed"] else ""))
+    if facts["sensor"]:
+        page.text(f"{facts['sensor']}.")
     page.section("What can be fitted")
     cannot = facts["cannot"]
     page.items(facts["can"] or ["Nothing yet."])

@@ -309,17 +309,22 @@ def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool
     Raises `FormatError`: It comes with the package or another, can't be read, or there is a profile of the new id.
     """
     from xosc_lateral.files import profiles
+    from xosc_lateral.files.atomic import mend, remove_together, together
     from xosc_lateral.files.source import edit_in_place
 
     path = profiles.own_path(str(name), as_paths(library))
     renamed = profiles.described(profiles.read_profile(path), name=new)
     output = path.with_name(f"{renamed.name}.json")
+    mend([output])
+    if not path.exists():  # a run that was killed had got as far
+        return output
     if output.exists() and not force and not output.samefile(path):
         raise FormatError("there is a profile of this id; --force replaces it", path=output)
     edit_in_place(path)
-    profiles.write_profile(renamed, output)
-    if not output.samefile(path):
-        path.unlink()
+    with together():
+        profiles.write_profile(renamed, output)
+        if not (output.exists() and output.samefile(path)):
+            remove_together(path)
     return output
 
 

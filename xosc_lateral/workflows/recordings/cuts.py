@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rows import blocks
 from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course
@@ -82,22 +83,26 @@ def name_states(
     time: FloatArray,
     step: float,
     settings: CutSettings,
-) -> NDArray[np.str_]:
+) -> pd.Categorical[str]:
     """Per row `KEPT_ROWS`, or the first reason that cuts it; "edge" at the ends of what is left, "short" for crumbs."""
-    state = np.select(list(reasons.values()), list(reasons), default=KEPT_ROWS)
-    run = _kept_runs(state, lane, vehicle, time)
+    code = np.zeros(len(time), dtype=np.int8)
+    for k, cut in reversed([*enumerate(reasons.values(), 1)]):
+        code[cut] = k
+    kept = code == 0
+    run = _kept_runs(kept, lane, vehicle, time)
     count = np.bincount(run)
     place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
     edge = round(settings.edge / step)
-    at_edge = (place < edge) | (place >= count[run] - edge)
-    short = (count[run] - 2 * edge) * step < settings.shortest
-    return np.where(state == KEPT_ROWS, np.where(short, "short", np.where(at_edge, "edge", KEPT_ROWS)), state)
+    code[kept & ((place < edge) | (place >= count[run] - edge))] = len(reasons) + 1
+    code[kept & ((count - 2 * edge) * step < settings.shortest)[run]] = len(reasons) + 2
+    names = pd.Index([KEPT_ROWS, *reasons, "edge", "short"])
+    return pd.Categorical.from_codes(code, categories=names)
 
 
-def number_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
+def number_runs(state: pd.Categorical[str], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of the kept stretch of each row, counted from 0 in every vehicle; -1 for rows that are cut."""
-    run = _kept_runs(state, lane, vehicle, time)
-    kept = state == KEPT_ROWS
+    kept = np.asarray(state == KEPT_ROWS)
+    run = _kept_runs(kept, lane, vehicle, time)
     begins = kept & np.r_[True, (run[1:] != run[:-1])]
     counted = np.cumsum(begins)
     start = np.searchsorted(vehicle, vehicle, side="left")
@@ -131,13 +136,13 @@ def cut_table(
     changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
     state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
     runs = number_runs(state, lane, vehicle, time)
-    more = {"vehicle_class": kind, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
-    return pd.DataFrame({**columns, **more})
+    words = pd.concat([pd.Series(kind[part], dtype=str) for part in blocks(len(kind))], ignore_index=True)
+    more = {"vehicle_class": words.array, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
+    return pd.DataFrame({**columns, **more}, copy=False)
 
 
-def _kept_runs(state: NDArray[np.str_], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
+def _kept_runs(kept: BoolArray, lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
-    kept = state == KEPT_ROWS
     other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
     return _runs(other | (np.diff(time) > MAX_GAP + 1e-9))
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.workflows.recordings.lane_graph import At, RoadLanes
 from xosc_lateral.workflows.recordings.plan import VehiclePlan
-from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.motion.nominal import EntityMotion
 
 ENCOUNTER_DISTANCE = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
 BRAKING_DECELERATION = 1.0  # from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
@@ -55,28 +56,18 @@ def brakings(plan: VehiclePlan) -> list[int]:
     return (1 + np.flatnonzero(hard[1:] & ~hard[:-1])).tolist()
 
 
-def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Encounter, ...]:
+def encounters(plans: Sequence[VehiclePlan], lanes: RoadLanes) -> tuple[Encounter, ...]:
     """All lane changes and brakings, in order of time."""
     met = list[Encounter]()
     for plan in plans:
         for transition, lane in zip(plan.lateral.transitions, plan.targets, strict=True):
             if transition.lanes:
                 time, side = transition.start + 0.5 * transition.duration, "left" if transition.lanes > 0 else "right"
-                beside = _beside(plan, plans, time, network, lane)
+                beside = _beside(plan, plans, time, lanes, lane)
                 met.append(Encounter("lane change", plan.name, time, side, *beside))
         for time in plan.speed.time[brakings(plan)].tolist():
-            met.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, network)))
+            met.append(Encounter("braking", plan.name, time, "", *_beside(plan, plans, time, lanes)))
     return tuple(sorted(met, key=lambda encounter: (encounter.time, encounter.vehicle)))
-
-
-def _lane_at(plan: VehiclePlan, time: float, network: RoadNetwork) -> tuple[int, int, int] | None:
-    """Road, lane and direction along s of the recorded vehicle at a moment; None: it is not there."""
-    vehicle = plan.vehicle
-    if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
-        return None
-    row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
-    road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
-    return road, lane, network.travel_direction(road, lane) * int(vehicle.way()[row])
 
 
 def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
@@ -84,45 +75,73 @@ def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
     return np.interp(plan.time_at(plan.speed.way(time)), plan.vehicle.time, plan.vehicle.s)
 
 
+def _at(plan: VehiclePlan, time: float) -> At | None:
+    """Where a vehicle is at a moment: in its recorded lane, as far as planned; None: it is not there."""
+    vehicle = plan.vehicle
+    if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
+        return None
+    row, s = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1), _along(plan, np.array([time]))
+    way, box = int(vehicle.way(slice(row, row + 1))[0]), vehicle.box
+    return At(int(vehicle.road[row]), int(vehicle.lane[row]), way, float(s[0]), box.center_x, box.length)
+
+
+def vehicle_ahead(
+    vehicle: EntityMotion, row: int, vehicles: Sequence[EntityMotion], lanes: RoadLanes
+) -> tuple[float, float]:
+    """Free space to the vehicle ahead in its lane [m], and how fast that gets less [m/s]; NaN: none is near."""
+    time = float(vehicle.time[row])
+    rows = [(one, int(np.searchsorted(one.time, time - 1e-9))) for one in vehicles]
+    there = [(one, k) for one, k in rows if k < len(one.time) and one.time[0] <= time + 1e-9 and one.road[k] >= 0]
+    number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
+    if number is None:
+        return np.nan, np.nan
+    places = [
+        At(int(one.road[k]), int(one.lane[k]), int(one.way(slice(k, k + 1))[0]), float(one.s[k]), one.box.center_x,
+           one.box.length)
+        for one, k in there
+    ]  # fmt: skip
+    ahead, _ = lanes.nearest(places, number)
+    if ahead is None or ahead[1] >= ENCOUNTER_DISTANCE:
+        return np.nan, np.nan
+    other, other_row = there[ahead[0]]
+    return ahead[1], float(vehicle.speed[row] - other.speed[other_row])
+
+
 def _beside(
-    plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, network: RoadNetwork, lane: int | None = None
-) -> tuple[Beside | None, Beside | None]:
-    """Nearest vehicle ahead and behind in a lane of the same road; None: the lane that it is in."""
-    place = _lane_at(plan, time, network)
-    if place is None:
-        return None, None
-    road, here_lane, way = place
-    wanted, at = (road, here_lane if lane is None else lane, way), np.array([time])
-    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.box.center_x, float(plan.speed.at(at)[0])
-    best: list[Beside | None] = [None, None]
-    for other in plans:
-        if other is plan or _lane_at(other, time, network) != wanted:
+    plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, lanes: RoadLanes, lane: int | None = None
+) -> list[Beside | None]:
+    """Nearest vehicle ahead and behind in a lane of its road; None: the lane that it is in."""
+    there = [(one, at) for one in plans if (at := _at(one, time)) is not None]
+    number = next((k for k, (one, _) in enumerate(there) if one is plan), None)
+    if number is None:
+        return [None, None]
+    beside, speed, now = list[Beside | None](), float(plan.speed.at(np.array([time]))[0]), np.array([time])
+    for known, ahead in zip(lanes.nearest([at for _, at in there], number, lane), (1.0, -1.0), strict=True):
+        if known is None or known[1] > ENCOUNTER_DISTANCE:
+            beside.append(None)
             continue
-        middle = way * float(_along(other, at)[0]) + other.vehicle.box.center_x - here
-        gap = max(abs(middle) - 0.5 * (other.vehicle.box.length + plan.vehicle.box.length), 0.0)
-        k, ahead = (0, 1.0) if middle > 0.0 else (1, -1.0)
-        closing, known = (speed - float(other.speed.at(at)[0])) * ahead, best[k]
-        if gap <= ENCOUNTER_DISTANCE and (known is None or gap < known.gap):
-            best[k] = Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf)
-    return best[0], best[1]
+        other, gap = there[known[0]][0], known[1]
+        closing = (speed - float(other.speed.at(now)[0])) * ahead
+        beside.append(Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf))
+    return beside
 
 
 Triggers = tuple[dict[int, RelativeTrigger], dict[int, RelativeTrigger]]
 """Of transitions by their number, of brakings by the number of their corner in the speed profile."""
 
 
-def relative_triggers(plan: VehiclePlan, plans: Sequence[VehiclePlan], network: RoadNetwork) -> Triggers:
+def relative_triggers(plan: VehiclePlan, plans: Sequence[VehiclePlan], lanes: RoadLanes) -> Triggers:
     """Triggers that the plans bear out."""
     changes, braking = dict[int, RelativeTrigger](), dict[int, RelativeTrigger]()
     for k, (transition, lane) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
         if transition.lanes:
             time = transition.start
-            behind, ahead = _beside(plan, plans, time, network, lane)[1], _beside(plan, plans, time, network)[0]
+            behind, ahead = _beside(plan, plans, time, lanes, lane)[1], _beside(plan, plans, time, lanes)[0]
             if trigger := _trigger(plan, behind, plans, time) or _trigger(plan, ahead, plans, time):
                 changes[k] = trigger
     for k in brakings(plan):
         time = float(plan.speed.time[k])
-        if trigger := _trigger(plan, _beside(plan, plans, time, network)[0], plans, time):
+        if trigger := _trigger(plan, _beside(plan, plans, time, lanes)[0], plans, time):
             braking[k] = trigger
     return changes, braking
 

@@ -1,15 +1,27 @@
-"""How pieces of lanes hang together, who is on them at one instant, and who drives ahead and beside."""
+"""How pieces of lanes hang together, who is on them at one instant, and who drives ahead, behind and beside.
+
+The one answer to who is next to whom in which lane, for imports, `reconstruct`, maneuver profiles and `detect`. What a
+driver makes of those around, as their bodies come and go, is `world.surroundings.around`.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.drivers.drives.drive import MAX_GAP
+from xosc_lateral.world.road.lanes import DRIVING, beside
+from xosc_lateral.world.road.network import RoadNetwork
+
+INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +35,7 @@ class LaneGraph:
     # without it they are of one length
     facing: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
+    @cached_property
     def layout(self) -> tuple[IntArray, list[tuple[FloatArray, FloatArray]], IntArray]:
         """Part of the network, ways along each piece with their stations [m], and its rank, growing to the left.
 
@@ -70,7 +83,7 @@ class LaneGraph:
 
     def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
         """Part, station [m], rank of places `along` pieces [m], and metres along a piece per metre of station."""
-        part, lines, rank = self.layout()
+        part, lines, rank = self.layout
         station, scale = np.array(along, dtype=np.float64), np.ones(len(along))
         for number in np.unique(piece):
             mine = piece == number
@@ -79,6 +92,131 @@ class LaneGraph:
             ends = follow(here - SLOPE_LENGTH, lines[number]), follow(here + SLOPE_LENGTH, lines[number])
             scale[mine] = 2.0 * SLOPE_LENGTH / np.maximum(ends[1] - ends[0], SLOPE_LENGTH)
         return part[piece], station, rank[piece], scale
+
+
+class At(NamedTuple):
+    """Where a vehicle is at a moment."""
+
+    road: int  # index into the network's
+    lane: int
+    way: int  # 1: as its lane is driven, -1: against it
+    s: float  # of its reference point [m]
+    ahead: float  # of that, its middle [m]
+    length: float  # [m]
+
+
+class RoadLanes:
+    """Driving lanes of a road network: a piece is one in one lane section."""
+
+    def __init__(self, network: RoadNetwork) -> None:
+        self.network = network
+        places, ends, forward = list[tuple[int, int]](), list[tuple[float, float]](), list[bool]()
+        for index, road in enumerate(network.roads):
+            for section in road.sections:
+                for lane in section.lanes:
+                    if lane.type in DRIVING:
+                        places.append((index, lane.id))
+                        ends.append((section.start, section.end))
+                        forward.append(network.travel_direction(index, lane.id) > 0)
+        self._road, self._lane = np.array(places, dtype=np.int64).reshape(-1, 2).T
+        (self._start, self._end), self._forward = np.array(ends).reshape(-1, 2).T, np.array(forward, dtype=np.bool_)
+        self._most = int(np.abs(self._lane).max(initial=0)) + 1
+        keys = self._keys(self._road, self._lane, 0.5 * (self._start + self._end))
+        self._order = np.argsort(keys, kind="stable")
+        self._sorted = keys[self._order]
+
+    def _keys(self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray) -> IntArray:
+        lane = np.where(np.abs(lane) < self._most, lane, self._most)
+        return np.asarray(self.network.section_numbers(road, s), dtype=np.int64) * (2 * self._most + 1) + lane
+
+    def place(self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Piece of each place, -1: in none, and how far along it in its direction of travel [m]; shape (n,)."""
+        if not len(self._sorted):
+            return np.full(len(s), -1), np.zeros(len(s))
+        keys = self._keys(road, lane, s)
+        at = np.minimum(np.searchsorted(self._sorted, keys), len(self._sorted) - 1)
+        piece = np.where(self._sorted[at] == keys, self._order[at], -1)
+        return piece, np.where(self._forward[piece], s - self._start[piece], self._end[piece] - s)
+
+    @cached_property
+    def graph(self) -> LaneGraph:
+        """How they hang together."""
+        road, lane, way = self._road, self._lane, np.where(self._forward, 1, -1)
+        middles = 0.5 * (self._start + self._end)
+        others = np.array([beside(*pair) for pair in zip(lane.tolist(), way.tolist(), strict=True)], dtype=np.int64)
+        left, _ = self.place(road, others, middles)
+        same = [
+            self.network.travel_direction(*pair) == mine
+            for *pair, mine in zip(road.tolist(), others.tolist(), way.tolist(), strict=True)
+        ]
+        following = list[list[int]]()
+        for number, forward in enumerate(self._forward.tolist()):
+            end = self._end[number] - INTO_NEXT if forward else self._start[number] + INTO_NEXT
+            step = self.network.advance(int(road[number]), int(lane[number]), float(end), 2 * INTO_NEXT)
+            ahead, _ = self.place(*(np.array([each]) for each in (step.road, step.lane, step.s)))
+            following.append([int(ahead[0])] if step.remaining <= 0.0 and ahead[0] not in (-1, number) else [])
+        return LaneGraph(self._end - self._start, np.where(same, left, -1), following)
+
+    def stations(
+        self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray, way: IntArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Places, shape (n,): line, of lanes that hang together and vehicles that drive there the same way, -1: in no
+        driving lane; lane of it, growing to the left of their travel; station, growing as they drive [m].
+        """
+        piece, along = self.place(road, lane, s)
+        part, station, rank, _ = self.graph.stations(np.maximum(piece, 0), along)
+        return np.where(piece >= 0, 2 * part + (way < 0), -1), way * rank, way * station
+
+    def nearest(self, vehicles: Sequence[At], number: int, lane: int | None = None) -> list[tuple[int, float] | None]:
+        """Who is next ahead of one of the vehicles, and behind, of those that drive the same way, in its lane or
+        another of its road: number and free space [m]; None: nobody."""
+        every = [*vehicles, vehicles[number]._replace(lane=vehicles[number].lane if lane is None else lane)]
+        road, lanes, way, s, ahead, length = map(np.array, zip(*every, strict=True))
+        line, rank, station = self.stations(road, lanes, s, way)
+        group, middle = in_groups(line, rank - rank.min()), station + ahead
+        others = np.delete(np.arange(len(vehicles)), number)
+        order = Order(group[others], middle[others])
+        next_to = list[tuple[int, float] | None]()
+        for is_ahead in (True, False):
+            (row,) = order.next_to(group[-1:], middle[-1:], is_ahead=is_ahead).tolist()
+            if row < 0:
+                next_to.append(None)
+                continue
+            k = int(others[row])
+            free = max(abs(float(middle[k] - middle[-1])) - 0.5 * float(length[k] + length[-1]), 0.0)
+            next_to.append((k, free))
+        return next_to
+
+
+MOST_LANES = 64  # beside one another [-]
+
+
+def in_groups(frame: IntArray, lane: IntArray) -> IntArray:
+    """Number of the lane at the instant and on the part of the road of a frame; -1: in none. Shape (n,)."""
+    return np.where(frame >= 0, frame * MOST_LANES + lane, -1)
+
+
+class Order:
+    """Vehicles in order along the lanes that they are in: rows by group and place, shape (n,). [m]"""
+
+    def __init__(self, group: IntArray, place: FloatArray) -> None:
+        self._group, self._rows = group, np.lexsort((place, group))
+        # One sorted axis for all groups: each gets its own, far apart from the next.
+        self._span = float(np.ptp(place)) + 4.0 * (NEIGHBOUR_DISTANCE + MAXIMUM_LENGTH) if len(place) else 1.0
+        self._base = float(place.min()) if len(place) else 0.0
+        self._axis = self._on_axis(group[self._rows], place[self._rows])
+
+    def _on_axis(self, group: IntArray, place: FloatArray) -> FloatArray:
+        return group * self._span + (place - self._base)
+
+    def next_to(self, group: IntArray, place: FloatArray, *, is_ahead: bool) -> IntArray:
+        """Row of the first one ahead of each place in a group, or of the last one that is not; -1: nobody."""
+        if not len(self._rows):
+            return np.full(len(group), -1)
+        at = np.searchsorted(self._axis, self._on_axis(group, place), side="right") - (0 if is_ahead else 1)
+        inside = (at >= 0) & (at < len(self._rows))
+        other = self._rows[np.clip(at, 0, len(self._rows) - 1)]
+        return np.where(inside & (self._group[other] == group) & (group >= 0), other, -1)
 
 
 SLOPE_LENGTH = 10.0  # to each side: over which metres of a lane are compared with those of its neighbour [m]
@@ -112,20 +250,27 @@ def neighbour_columns(
     inside, piece = piece >= 0, np.maximum(piece, 0)
     part, station, rank, own_scale = graph.stations(piece, middle)
     scale = own_scale * scale
-    pool = pool_of(time, vehicle, step)
-    row = pool.row
-    is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
-    near = find_neighbours(
-        pool.instant * (int(part.max()) + 1) + part[row],
-        np.where(inside, rank - int(rank.min()), -1)[row],
-        pool.moved(station, np.where(inside, part, -1), speed / scale),
-        length[row],
-        is_truck[row],
-        lane_on_left=(graph.left[piece] >= 0)[row],
-        lane_on_right=is_left[piece][row],
-        scale=scale[row],
-    )
-    return {name: values[pool.of_row] for name, values in near.items()}
+    rank = np.where(inside, rank - int(rank.min()), -1)
+    line = np.where(inside, part, -1)
+    row_of, instant, moved, place = at_instants(station, line, speed / scale, time, vehicle, step)
+    del station, line, inside
+    on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
+    on_right[graph.left[on_left]] = True
+    columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
+    begin, n = 0, len(by_time)
+    while begin < n:  # as many instants at a time as have some rows
+        last = instant[by_time[min(begin + BLOCK, n) - 1]]
+        end = int(np.searchsorted(instant, last, side="right", sorter=by_time))
+        rows = by_time[begin:end]
+        row, begin = row_of[rows], end
+        near = find_neighbours(
+            instant[rows] * parts + part[row], rank[row], moved[rows], length[row], is_truck[row],
+            lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
+        )  # fmt: skip
+        for name, values in near.items():
+            columns.setdefault(name, np.empty(n))[rows] = values
+    del row_of, instant, moved, by_time
+    return {name: columns.pop(name)[place] for name in list(columns)}
 
 
 NEIGHBOUR_DISTANCE = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
@@ -151,29 +296,23 @@ def find_neighbours(
     `scale`: metres along the own lane per metre of `s`. [-]
     """
     known = lane >= 0
-    group = np.where(known, frame * 64 + lane, -1)
-    order = np.lexsort((s, group))
-    # One sorted axis for all groups: each gets its own, far apart from the next.
-    span = float(np.ptp(s)) + 4.0 * (NEIGHBOUR_DISTANCE + MAXIMUM_LENGTH) if len(s) else 1.0
-    base = float(s.min()) if len(s) else 0.0
-    axis = group[order] * span + (s[order] - base)
+    group = in_groups(np.where(known, frame, -1), lane)
+    order = Order(group, s)
 
-    def nearest(target: IntArray, there: BoolArray, *, ahead_only: bool = False) -> tuple[FloatArray, FloatArray]:
-        place = target * span + (s - base)
-        after = np.searchsorted(axis, place, side="right")
+    def nearest(aside: int, there: BoolArray, back: BoolArray) -> tuple[FloatArray, FloatArray]:
         best, truck = np.full(len(s), np.inf), np.zeros(len(s))
-        for candidate in (after,) if ahead_only else (after, after - 1):
-            inside = (candidate >= 0) & (candidate < len(axis)) & known
-            other = order[np.clip(candidate, 0, len(axis) - 1)]
+        for is_ahead in (True, False) if aside else (True,):
+            other = order.next_to(np.where(known, group + aside, -1), s, is_ahead=is_ahead)
             free = np.maximum(scale * np.abs(s[other] - s) - 0.5 * (length[other] + length), 0.0)
-            gap = np.where(inside & (group[other] == target), free, np.inf)
+            # a ramp's lane lies beside nothing before it comes in
+            gap = np.where((other >= 0) & (there | back[other]), free, np.inf)
             closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    lead, lead_is_truck = nearest(group, known, ahead_only=True)
-    left, left_is_truck = nearest(np.where(known, group + 1, -2), lane_on_left)
-    right, right_is_truck = nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right)
+    lead, lead_is_truck = nearest(0, known, known)
+    left, left_is_truck = nearest(1, lane_on_left, lane_on_right)
+    right, right_is_truck = nearest(-1, lane_on_right, lane_on_left)
     return {
         "lead_distance": lead, "lead_is_truck": lead_is_truck, "left_distance": left, "left_is_truck": left_is_truck,
         "right_distance": right, "right_is_truck": right_is_truck,
@@ -216,27 +355,14 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
         span *= 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Pool:
-    """Every vehicle at every instant from its first to its last, those that it misses for a moment too; shape (m,)."""
+def at_instants(
+    along: FloatArray, part: IntArray, speed: FloatArray, time: FloatArray, vehicle: IntArray, step: float
+) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+    """Every vehicle at every instant from its first to its last, those too that it misses for at most `MAX_GAP`.
 
-    row: IntArray  # row of the recording, or of the last one before
-    after: IntArray  # row of the vehicle's next instant with a row; only where `share` is not 0
-    instant: IntArray
-    later: FloatArray  # time of the instant less that of `row` [s]
-    share: FloatArray  # of the way from `row` to the vehicle's next, 0 where the instant is its own [-]
-    of_row: IntArray  # place of each row of the recording in the pool, shape (n,)
-
-    def moved(self, along: FloatArray, part: IntArray, speed: FloatArray) -> FloatArray:
-        """Way along the road at the instants: between two rows of one part of the road, else as fast as before. [m]"""
-        after = self.after
-        between = (self.share > 0.0) & (part[after] == part[self.row])
-        on = along[self.row] + speed[self.row] * self.later
-        return np.where(between, along[self.row] + self.share * (along[after] - along[self.row]), on)
-
-
-def pool_of(time: FloatArray, vehicle: IntArray, step: float) -> Pool:
-    """See `Pool`; instants missing for at most `MAX_GAP` are filled."""
+    Row of the recording, or the last one before; number of the instant; way along the road there: between two rows of
+    one part of the road, else as fast as before [m]; and place of each row of the recording among these, shape (n,).
+    """
     instant, when = instants(time, vehicle, step)
     new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
     row = np.flatnonzero(new)
@@ -252,8 +378,8 @@ def pool_of(time: FloatArray, vehicle: IntArray, step: float) -> Pool:
     known = np.isfinite(times[filled])  # nobody was seen at others
     last, following, filled = last[known], following[known], filled[known]
     later = times[filled] - time[last]
-    share = later / np.maximum(time[following] - time[last], 1e-9)
-    return Pool(
-        np.r_[row, last], np.r_[row, following], np.r_[instant[row], filled], np.r_[when[row] - time[row], later],
-        np.r_[np.zeros(len(row)), np.clip(share, 0.0, 1.0)], np.cumsum(new) - 1,
-    )  # fmt: skip
+    share = np.clip(later / np.maximum(time[following] - time[last], 1e-9), 0.0, 1.0)
+    between = (share > 0.0) & (part[following] == part[last])
+    way = along[last] + np.where(between, share * (along[following] - along[last]), speed[last] * later)
+    moved = along[row] + speed[row] * (when[row] - time[row])
+    return np.r_[row, last], np.r_[instant[row], filled], np.r_[moved, way], np.cumsum(new) - 1

@@ -12,8 +12,9 @@ from typing import TypeAlias
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course, Rough, lateral_speed
+from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW, SETTLED_OFFSET, Course, Rough
 from xosc_lateral.workflows.recordings.recorded import MOVING_SPEED, own_lateral
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.segments import bell_share
@@ -93,7 +94,7 @@ def lateral_plan(vehicle: EntityMotion, begin: float) -> LateralPlan:
     still = np.zeros(len(y), dtype=np.bool_)
     for part in still_parts:
         still[part] = True
-    driven = np.hypot(lateral_speed(vehicle.time, vehicle.x), lateral_speed(vehicle.time, vehicle.y))
+    driven = np.hypot(*(rate(each, time, RATE_WINDOW) for each in (vehicle.x, vehicle.y)))
     moving = driven >= MOVING_SPEED  # in a jam, people stand still sideways too
     is_played = bool((still[moving] if moving.any() else still).mean() > 0.5)
     if is_played:

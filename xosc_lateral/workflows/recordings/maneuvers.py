@@ -12,12 +12,13 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, COLUMNS, Maneuvers, fit_maneuvers
 from xosc_lateral.drivers.model.profile import SIDES
+from xosc_lateral.workflows.recordings.encounters import vehicle_ahead
+from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 from xosc_lateral.workflows.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.workflows.recordings.recordings import read_recording
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.ahead import vehicle_ahead
 
 BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""
@@ -35,6 +36,7 @@ def maneuvers_of(
 ) -> Maneuvers:
     """Maneuver profile of some drivers among vehicles in the lanes of a road; raises `NotEnoughDataError`."""
     measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
+    lanes = RoadLanes(network)
     ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
     for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
@@ -45,8 +47,7 @@ def maneuvers_of(
         free = float(vehicle.time[0])
         for transition in plan.transitions:
             if transition.lanes and not transition.cut:
-                facts = _facts(vehicle, transition, vehicles, network)
-                for name, value in zip(COLUMNS, facts, strict=True):
+                for name, value in zip(COLUMNS, _facts(vehicle, transition, vehicles, lanes), strict=True):
                     measured[name].append(value)
                 sides.append(transition.lanes > 0)
                 way = _way_before(vehicle, transition, free)
@@ -62,13 +63,13 @@ def maneuvers_of(
 
 
 def _facts(
-    vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], network: RoadNetwork
+    vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], lanes: RoadLanes
 ) -> tuple[float, ...]:
     """`COLUMNS` of a lane change."""
     ends = np.searchsorted(vehicle.time, (transition.start, transition.end))
     first, last = np.minimum(ends, len(vehicle.time) - 1).tolist()
     speed, width = float(vehicle.speed[first]), float(vehicle.lane_width[first])
-    ahead = vehicle_ahead(vehicle, first, vehicles, network)
+    ahead = vehicle_ahead(vehicle, first, vehicles, lanes)
     return transition.duration, speed, float(vehicle.speed[last]) - speed, width, vehicle.box.length, *ahead
 
 

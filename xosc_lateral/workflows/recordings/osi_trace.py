@@ -295,10 +295,9 @@ class _Collected:
         kinds = np.array([self.kinds[number] for number in numbers.tolist()], dtype=str)[codes]
         _, time, x, y, yaw, speed, length, *rest = rows.T
         usual = np.array([USUAL_LENGTH.get(str(kind), 4.6) for kind in kinds])
-        tracks, order = tracks_of_rows(
-            labels, codes, time, x, y, self.path, heading=yaw, speed=speed, kind=kinds, dropped=self.lost,
-            length=np.where(np.isfinite(length), length, usual),
-        )  # fmt: skip
+        length = np.where(np.isfinite(length), length, usual)
+        columns = {"time": time, "x": x, "y": y, "heading": yaw, "speed": speed, "kind": kinds, "length": length}
+        tracks, order = tracks_of_rows(labels, codes, columns, self.path, dropped=self.lost)
         notes += [*tracks.notes, *(f"{count} rows left out: {why}" for why, count in tracks.dropped.items())]
         hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
         if len(hosts) > 1:

@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
@@ -157,5 +158,5 @@ def recorded_path(plan: VehiclePlan, time: FloatArray, motion: EntityMotion) -> 
     vehicle = plan.vehicle
     held = np.clip(time, vehicle.time[0], vehicle.time[-1])
     x, y = (np.interp(held, vehicle.time, values) for values in (vehicle.x, vehicle.y))
-    speed = np.hypot(np.gradient(x, time), np.gradient(y, time)) if len(time) > 1 else motion.speed
+    speed = np.hypot(rate(x, FRAME), rate(y, FRAME))
     return motion.having(x=x, y=y, speed=speed)

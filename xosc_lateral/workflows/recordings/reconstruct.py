@@ -21,6 +21,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.texts import composed
@@ -33,6 +34,7 @@ from xosc_lateral.files.remote import local
 from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
 from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.recordings.encounters import encounters, relative_triggers
+from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 from xosc_lateral.workflows.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.workflows.recordings.reconstruction import ChosenDriver, Reconstruction
 from xosc_lateral.workflows.recordings.recorded import RecordedTrack, place_tracks
@@ -97,9 +99,10 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     entity = next((plan.name for plan in plans if plan.vehicle.name == host), None)
     if settings.host is not None and host is not None and entity is None:
         raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
-    met = encounters(plans, network)
+    lanes = RoadLanes(network)
+    met = encounters(plans, lanes)
     is_relative = settings.relative and not settings.exact
-    relative = {plan.name: relative_triggers(plan, plans, network) for plan in plans if is_relative}
+    relative = {plan.name: relative_triggers(plan, plans, lanes) for plan in plans if is_relative}
     scenario = reconstructed_scenario(traffic, recording, plans, relative, settings, entity)
     return Reconstruction(traffic, recording, plans, scenario, met, relative, *_drivers(plans, settings), entity)
 
@@ -244,5 +247,5 @@ def _windows(offset: FloatArray) -> FloatArray:
 def _summaries(windows: FloatArray) -> FloatArray:
     """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
     spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
-    speed = np.sqrt((np.diff(windows, axis=1) ** 2).mean(axis=1)) / STEP
+    speed = np.sqrt((rate(windows, STEP, past=True)[:, 1:] ** 2).mean(axis=1))
     return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])

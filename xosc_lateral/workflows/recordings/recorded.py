@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 from xosc_lateral.drivers.drives.identity import LONGEST_BRIDGE, LONGEST_GAP, leaps
@@ -137,10 +138,9 @@ def _place(
     if inferred[best].any():
         left_out.append(f"{track.name}: {int(inferred[best].sum())} rows are inferred: nobody saw it for up to 4 s")
     moments, x, y, turned = time[best] - start, x[best], y[best], np.where(way[best] < 0, np.pi, 0.0)
-    step = np.maximum(np.gradient(moments), 1e-6)
     motion = EntityMotion.of(
         track.entity, moments, x=x, y=y, heading=lane_heading[best] + turned, heading_relative=turned,
-        speed=np.hypot(np.gradient(x) / step, np.gradient(y) / step), road=nearest.road[best], lane=nearest.lane[best],
+        speed=np.hypot(rate(x, moments), rate(y, moments)), road=nearest.road[best], lane=nearest.lane[best],
         s=nearest.s[best], offset=nearest.offset[best], lane_width=width[best],
     )  # fmt: skip
     return motion, inferred[best]

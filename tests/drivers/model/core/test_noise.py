@@ -52,18 +52,20 @@ def test_sampled_noise_has_the_variance_of_its_kernel() -> None:
     assert values.var() == pytest.approx(NOISE_VARIANCE * (noise.kernel**2).sum(), rel=0.03)
 
 
+@pytest.mark.parametrize("paths", [1, 3])
 @pytest.mark.parametrize("n", [1, 7, 511, 512, 513, 5000])
-def test_compiled_and_plain_convolution_agree_to_the_last_bit(n: int) -> None:
+def test_compiled_and_plain_convolution_agree_to_the_last_bit(n: int, paths: int) -> None:
     rng = np.random.default_rng(n)
     kernel = rng.normal(size=51)
     kernel += kernel[::-1]
-    values, result = rng.normal(size=n + 50), np.empty(n)
-    _convolve_compiled()(values, kernel, result)
+    values, result = rng.normal(size=(n + 50, paths)), np.empty(n * paths)
+    _convolve_compiled()(values.ravel(), kernel, paths, result)
     half = kernel[25] * values[25 : 25 + n]
     for k in range(25):
         half += kernel[k] * (values[k : k + n] + values[50 - k : 50 - k + n])
-    assert np.array_equal(result, half)
-    assert np.allclose(convolve(values, kernel), np.convolve(values, kernel, "valid"))
+    assert np.array_equal(result.reshape(n, paths), half)
+    one = convolve(values, kernel)
+    assert np.allclose(one.T, [np.convolve(path, kernel, "valid") for path in values.T])
 
 
 def test_a_loop_gives_the_same_compiled_and_plain() -> None:

@@ -164,7 +164,8 @@ def hold_peaks(values: FloatArray, beyond: float, peak: float, last: float) -> F
 
     An episode is a stretch `beyond` a size, to one side; `peak` and `last` are what is held and the value just before.
     """
-    before, *sides = np.where(np.abs([last, *values]) > beyond, np.sign([last, *values]), 0.0).tolist()
+    series = np.concatenate([[last], values])
+    before, *sides = np.where(np.abs(series) > beyond, np.sign(series), 0.0).tolist()
     edges = np.flatnonzero(np.diff([before, *sides]))
     held = np.empty(len(values))
     for first, end in pairwise(dict.fromkeys((0, *edges.tolist(), len(values)))):

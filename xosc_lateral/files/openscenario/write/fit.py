@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from xosc_lateral.base.track import Track
-from xosc_lateral.files.held import exists, held_at
+from xosc_lateral.files.held import exists
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
@@ -20,6 +20,7 @@ from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.reactive import LateralActions, add_paths
 from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version
+from xosc_lateral.files.remote import leads_from
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.parameters import ExpressionError
@@ -89,9 +90,7 @@ _REFERENCES = {"Directory": "path"} | dict.fromkeys(("LogicFile", "SceneGraphFil
 def rewrite_paths(draft: Draft, output: Path) -> None:
     """Rewrite relative file references: they lead where they led before; a road found elsewhere is repaired."""
     scenario = draft.scenario
-    old, new = _absolute(scenario.path).parent, _absolute(output).parent
-    if held_at(old) is not None:  # nobody knows where its files will lie
-        new = old
+    old, new = (_absolute(path).parent for path in (scenario.path, leads_from(scenario.path, output)))
     # Folders of catalogs that lie in none of the scenario's catalog locations.
     known = [_absolute(path) for path in scenario.catalog_locations.values()]
     known += [path.parent for path in known if path.suffix.lower() == ".xosc"]

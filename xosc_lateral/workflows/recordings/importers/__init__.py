@@ -241,16 +241,24 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
                     raise
                 raise NotEnoughDataError(f"{path}: {error}") from error
             table, record = made.table, made.provenance
-            kept = table if keep_cut else table[table["state"] == KEPT_ROWS].drop(columns="state")
+            kept, read_rows = table if keep_cut else _kept_rows(table), len(table)
             if kept.empty:
                 first = path / record.source.split(", ")[0] if path.is_dir() else path
-                raise NotEnoughDataError(f"{first}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-            kept = kept.reset_index(drop=True)
+                raise NotEnoughDataError(f"{first}: nothing is left of {read_rows} rows ({dict(record.rows)})")
             _refuse_nonsense(kept, path)
         return ImportedDrives(kept, record)
 
     within.can_keep_cut = True  # type: ignore[attr-defined]
     return within
+
+
+def _kept_rows(table: pd.DataFrame) -> pd.DataFrame:
+    """Rows that are not cut, column by column: each goes as soon as it was taken from."""
+    kept = (table.pop("state") == KEPT_ROWS).to_numpy()
+    columns = {}
+    for name in list(table.columns):
+        columns[name] = table.pop(name).array[kept]
+    return pd.DataFrame(columns, copy=False)
 
 
 def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:

@@ -105,8 +105,10 @@ def _tracks(scenario: Any, path: Path, label: str) -> Tracks:
     vehicle, step, x, y, heading, speed = np.array(rows, dtype=np.float64).T
     whose = vehicle.astype(np.int64)
     return tracks_of_rows(
-        names, whose, float(scenario.dt) * step, x, y, path, heading=heading, speed=speed, step=float(scenario.dt),
-        length=np.array(lengths)[whose], kind=np.array(kinds)[whose],
+        names, whose,
+        {"time": float(scenario.dt) * step, "x": x, "y": y, "heading": heading, "speed": speed,
+         "length": np.array(lengths)[whose], "kind": np.array(kinds)[whose]},
+        path, step=float(scenario.dt),
     )[0]  # fmt: skip
 
 

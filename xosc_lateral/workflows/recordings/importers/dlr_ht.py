@@ -111,7 +111,7 @@ def import_dlr_ht(
     table[VALID_BELOW], table[RESOLUTION] = HIGHEST_FREQUENCY, POSITION_RESOLUTION
     reasons = {"no lane": road.lane < 0, "lane change": road.changing, "gap": road.gap}
     table["state"] = name_states(reasons, road.lane, vehicle, time, STEP, settings)
-    table[RUN] = number_runs(table["state"].to_numpy(), road.lane, vehicle, time)
+    table[RUN] = number_runs(table["state"].array, road.lane, vehicle, time)
     lanes = []
     for carriageway, both in road.lanes.items():
         for index, lane in enumerate(both):

@@ -111,12 +111,11 @@ def read_streams(
     codes, labels = frame["id"].factorize(sort=True)
     x, y = (frame[f"center_{axis}"].to_numpy(dtype=np.float64) for axis in ("easting", "northing"))
     time = _seconds(frame, stamps.min())
-    size: dict[str, Any] = {name: frame[f"dimension_{name}"].to_numpy() for name in ("length", "width", "height")}
-    tracks, _ = tracks_of_rows(
-        [str(label) for label in labels], codes, time, x - round(x.mean()), y - round(y.mean()), source,
-        heading=np.radians(frame["yaw"].to_numpy(dtype=np.float64)), kind=kind, dropped=dropped,
-        speed=frame["velocity_magnitude"].to_numpy(), **size,
-    )  # fmt: skip
+    rows: dict[str, Any] = {name: frame[f"dimension_{name}"].to_numpy() for name in ("length", "width", "height")}
+    rows |= {"time": time, "x": x - round(x.mean()), "y": y - round(y.mean()), "kind": kind}
+    rows["heading"] = np.radians(frame["yaw"].to_numpy(dtype=np.float64))
+    rows["speed"] = frame["velocity_magnitude"].to_numpy()
+    tracks, _ = tracks_of_rows([str(label) for label in labels], codes, rows, source, dropped=dropped)
     lines, following = lanes_of_streams(streams(tracks.x, tracks.y, tracks.speed, tracks.vehicle))
     if not lines:
         raise NotEnoughDataError(f"{source}: too few vehicles drive along one another's paths to show a lane")

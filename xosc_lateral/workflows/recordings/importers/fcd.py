@@ -199,8 +199,10 @@ def read_fcd(path: Path) -> Tracks:
     kind = np.array([name if (name := class_named(word)) in ON_ROADS else "" for word in types])[vehicle]
     length = np.array([sumo.usual_length(name) for name in types])[vehicle]
     tracks, _ = tracks_of_rows(
-        list(names), vehicle, time, x, y, path, heading=0.5 * np.pi - np.radians(angle), speed=speed, kind=kind,
-        length=length, rear=(REAR_FROM_FRONT - 0.5) * length,
+        list(names), vehicle,
+        {"time": time, "x": x, "y": y, "heading": 0.5 * np.pi - np.radians(angle), "speed": speed, "kind": kind,
+         "length": length, "rear": (REAR_FROM_FRONT - 0.5) * length},
+        path,
     )  # fmt: skip
     x, y, heading = tracks.x, tracks.y, tracks.heading
     for part in np.split(np.arange(len(x)), np.flatnonzero(np.diff(tracks.vehicle)) + 1):

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.mapping import classes_of
@@ -230,8 +231,8 @@ def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
     if len(inside) < 100:
         raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to find which side is left")
     towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
-    rate = _about_mean(np.gradient(lateral), inside, half)
-    agreement = float(np.corrcoef(towards_left, rate)[0, 1])
+    aside = _about_mean(rate(lateral, 1.0), inside, half)
+    agreement = float(np.corrcoef(towards_left, aside)[0, 1])
     if not abs(agreement) > 0.1:
         what = f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}"
         raise FormatError(what, path=path, element="latLaneCenterOffset")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
 from xosc_lateral.drivers.drives.identity import apart_in_time, identify
 from xosc_lateral.files.columns import (
@@ -118,24 +119,10 @@ MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the ne
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
-def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
-    """Speed from positions, shape (n,). [m/s]"""
-    return np.hypot(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (x, y)))
-
-
-def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray, step: float) -> FloatArray:
-    """Heading from positions, shape (n,). [rad]"""
-    return np.arctan2(*(rate(each, vehicle, time, step, SPEED_WINDOW) for each in (y, x)))
-
-
-def rate(values: FloatArray, vehicle: IntArray, time: FloatArray, step: float, window: float) -> FloatArray:
-    """Difference over a window about each row, within a vehicle's rows."""
-    first = np.searchsorted(vehicle, vehicle, side="left")
-    last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    half = max(1, round(0.5 * window / step))
-    rows = np.arange(len(values))
-    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
-    return np.asarray((values[high] - values[low]) / np.where(high > low, time[high] - time[low], step))
+def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Heading [rad] and speed [m/s] from positions, shape (n,)."""
+    vx, vy = (rate(each, time, SPEED_WINDOW, whose=vehicle) for each in (x, y))
+    return np.arctan2(vy, vx), np.hypot(vx, vy)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
@@ -143,8 +130,8 @@ def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | 
     saved = as_mapping(mapping)
     with open_source(path) as source:
         is_log = unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
-    table = read_esmini_log(path) if is_log else read_table(path, saved)
-    return tracks_of(table, path, columns, saved, is_log=is_log)
+    # no name holds the table: it goes as soon as its columns are taken
+    return tracks_of(read_esmini_log(path) if is_log else read_table(path, saved), path, columns, saved, is_log=is_log)
 
 
 def tracks_of(
@@ -155,62 +142,74 @@ def tracks_of(
     if is_played:  # its positions are those of reference points
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
     rows, lost = _columns(table, path, saved, columns)
-    codes, labels = rows["vehicle"].factorize(sort=True)
-    time, x, y = (rows[name].to_numpy(dtype=np.float64) for name in ("time", "x", "y"))
-    time = time * epoch_factor(time)
+    del table
+    codes, labels = rows.pop("vehicle").factorize(sort=True)
+    time = rows.pop("time").to_numpy()
+    if (factor := epoch_factor(time)) != 1.0:
+        time = time * factor
     order = np.lexsort((time, codes))
-    steps = np.diff(time[order])[(np.diff(codes[order]) == 0) & (np.diff(time[order]) > 0.0)]
-    if len(steps):  # in a wrong unit, all that moves leaps
-        require_row_step(float(np.median(steps)), path)
-    more: dict[str, Any] = {name: rows[name].to_numpy(dtype=np.float64) for name in STATED if name in rows}
-    kinds = rows["vehicle_class"].to_numpy(dtype=str) if "vehicle_class" in rows else np.full(len(rows), "")
-    usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
-    length = np.where(np.isfinite(stated := more.pop("length", usual)), stated, usual)
+    steps = np.diff(time[order])[np.diff(codes[order]) == 0]
+    if (steps > 0.0).any():  # in a wrong unit, all that moves leaps
+        require_row_step(float(np.median(steps[steps > 0.0])), path)
+    del order, steps
+    kind, usual, recording = np.full(len(time), ""), np.full(len(time), 4.6), None
+    if "recording" in rows:
+        recording = rows.pop("recording")
+    if "vehicle_class" in rows:
+        number, words = rows.pop("vehicle_class").factorize()
+        kind, usual = (
+            np.array(each)[number] for each in (list(words), [USUAL_LENGTH.get(word, 4.6) for word in words])
+        )
+    more: dict[str, Any] = {name: rows.pop(name).to_numpy() for name in list(rows.columns)}
+    if "length" in more:
+        usual = np.where(np.isfinite(more["length"]), more["length"], usual)
     if "rear" in more:
         more["rear"] = np.nan_to_num(more["rear"])
+    more |= {"time": time, "length": usual, "kind": kind}
+    del time, usual, kind
     tracks, _ = tracks_of_rows(
-        list(map(str, labels)), codes, time, x, y, path, length=length, kind=kinds, dropped=lost, **more,
-        recording=list(rows["recording"]) if "recording" in rows else None, is_believed=is_played or is_log,
-    )  # fmt: skip
+        list(map(str, labels)), codes, more, path, recording=recording, dropped=lost, is_believed=is_played or is_log
+    )
     require_row_step(tracks.step, path)
-    ahead = BEHIND_MIDDLE[saved.reference] * tracks.length
-    x, y = tracks.x + ahead * np.cos(tracks.heading), tracks.y + ahead * np.sin(tracks.heading)
+    x, y = tracks.x, tracks.y
+    if behind := BEHIND_MIDDLE[saved.reference]:
+        ahead = behind * tracks.length
+        x, y = x + ahead * np.cos(tracks.heading), y + ahead * np.sin(tracks.heading)
     return replace(tracks, time=tracks.time - float(tracks.time.min()), x=x, y=y, is_reference=is_played)
 
 
-STATED = ("heading", "speed", "length", "width", "rear")
-
-
 def tracks_of_rows(
-    names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray, path: Path, *,
-    heading: FloatArray | None = None, speed: FloatArray | None = None, recording: Sequence[str] | None = None,
+    names: Sequence[str], vehicle: IntArray, rows: dict[str, Any], path: Path, *, recording: pd.Series | None = None,
     step: float | None = None, dropped: Mapping[str, int] = MappingProxyType({}), is_believed: bool = True,
-    **columns: Any,
 ) -> tuple[Tracks, IntArray]:  # fmt: skip
-    """Tracks of rows in file order, arrays of shape (n,), see `Tracks`, and which row each of theirs is: who is who is
-    asked here, for all formats.
+    """Tracks of rows in file order, and which row each of theirs is: who is who is asked here, for all formats.
+
+    `rows`: columns of `Tracks`, shape (n,) each: time, x, y, length, kind and what else there is; they are taken out,
+    so that there are never two of all.
 
     Headings and speeds that are not there (NaN) are those of the way; unless they are believed, all have to agree with
     it. Raises `FormatError`, `NotEnoughDataError`.
     """
-    known = identify(names, vehicle, time, x, y, recording, path=path)
+    known = identify(names, vehicle, rows["time"], rows["x"], rows["y"], recording, path=path)
     order, whose = known.rows, known.vehicle
-    time, x, y = (values[order] for values in (time, x, y))
+    is_sorted = len(order) == len(vehicle) and bool((np.diff(order) == 1).all())
+    columns = {name: rows.pop(name) if is_sorted else rows.pop(name)[order] for name in list(rows)}
+    time, x, y = (columns.pop(name) for name in ("time", "x", "y"))
     if not (same := whose[1:] == whose[:-1]).any():
         raise NotEnoughDataError(f"{path}: no vehicle has two rows")
     step = float(np.median(np.diff(time)[same])) if step is None else step
-    way, driven = travel_heading(x, y, whose, time, step), ground_speed(x, y, whose, time, step)
+    way, driven = travelled(x, y, whose, time)
     heading, speed = (
-        otherwise if values is None else np.where(np.isfinite(values[order]), values[order], otherwise)
-        for values, otherwise in ((heading, way), (speed, driven))
+        np.where(np.isfinite(columns[name]), columns.pop(name), otherwise) if name in columns else otherwise
+        for name, otherwise in (("heading", way), ("speed", driven))
     )
     speed = np.abs(speed)
     if not is_believed:
         require_headings(heading, way, driven, path)
         _require_speed(speed, driven, path)
-    columns = {name: values[order] for name, values in columns.items()}
     tracks = Tracks(
-        known.names, whose, time, step, x, y, heading, speed, recording=known.recording, recordings=known.recordings,
+        known.names, whose, time, step, x, y, heading, speed, recordings=known.recordings,
+        recording=known.recording if len(known.recordings) > 1 else None,
         dropped={**dropped, **known.dropped}, notes=known.notes, **columns,
     )  # fmt: skip
     return tracks, order
@@ -253,23 +252,27 @@ def _columns(
         column = table[source.column]
         if name == "vehicle":
             columns[name] = column
-        elif name == "recording":
-            columns[name] = column.map(as_word)
-        elif name == "vehicle_class":
-            columns[name] = saved.class_names(column, path)
+        elif name in ("recording", "vehicle_class"):
+            codes, labels = column.factorize(use_na_sentinel=False)
+            label = pd.Series(labels, name=column.name)
+            named = saved.class_names(label, path) if name == "vehicle_class" else label.map(as_word)
+            columns[name] = named.astype("category").take(codes).set_axis(column.index)
         else:
             stamps = None
             if name == "time" and not pd.api.types.is_numeric_dtype(column):
                 stamps = seconds_of_stamps(column, path, saved.time_zone, columns["vehicle"])
             numbers = numbers_of(column, path, name) * source.factor if stamps is None else stamps
+            numbers[np.isinf(numbers)] = np.nan
             columns[name] = pd.Series(numbers, index=column.index)
-    every = pd.DataFrame(columns).replace([np.inf, -np.inf], np.nan)
-    made = every.dropna(subset=["vehicle", "time", "x", "y"])
+    every = pd.DataFrame(columns, copy=False)
+    placed = np.asarray(every[["vehicle", "time", "x", "y"]].notna().to_numpy().all(axis=1))
+    made = every if placed.all() else every.loc[placed]
     lost = {"not chosen": read - len(every), "no place or time": len(every) - len(made)}
     if "vehicle_class" in made:
         for word, rows in made["vehicle_class"].value_counts().items():
             lost |= {} if word in ON_ROADS or not word else {str(word): int(rows)}
-        made = made[made["vehicle_class"].isin([*ON_ROADS, ""])]
+        is_known = made["vehicle_class"].isin([*ON_ROADS, ""]).to_numpy()
+        made = made if is_known.all() else made.loc[is_known]
     return made, {reason: count for reason, count in lost.items() if count}
 
 
@@ -314,6 +317,6 @@ def read_esmini_log(path: Path) -> pd.DataFrame:
     for shift in range(0, width - max(group.values()), len(group)):
         frame = pd.DataFrame({name: table[group[theirs] + shift] for name, theirs in _LOGGED.items()})
         frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # fewer vehicles: empty
-    rows = pd.concat(frames, ignore_index=True)
+    rows = pd.concat(frames).sort_index(kind="stable")  # line by line: a vehicle's columns change
     rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
     return rows

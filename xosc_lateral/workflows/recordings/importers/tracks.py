@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
@@ -33,18 +35,15 @@ from xosc_lateral.workflows.recordings.cuts import (
     require_lane_direction,
 )
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
-from xosc_lateral.workflows.recordings.importers.track_table import Tracks, rate, read_tracks
-from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, neighbour_columns
-from xosc_lateral.world.road.lanes import DRIVING, beside
+from xosc_lateral.workflows.recordings.importers.track_table import Tracks, read_tracks
+from xosc_lateral.workflows.recordings.lane_graph import LaneGraph, RoadLanes, neighbour_columns
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
-INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
 CURVATURE_WINDOW = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]
 FACING_STEP = 5.0  # of places at which lanes beside each other are compared: 2 mm off at R = 100 m [m]
 POINT_SPACING = 1.0  # of a centre line, at most, so that the nearest point is next to a foot on it [m]
 END_TOLERANCE = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
-Piece = tuple[int, int, int]  # road, lane section, lane
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,62 +83,29 @@ def import_tracks(
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
     """Every row's driving lane, and what the road is like there; x and y are inertial: the header's offset goes."""
-    pieces, graph = lane_graph(network)
-    if not pieces:
+    lanes = RoadLanes(network)
+    if not len(lanes.graph.length):
         raise FormatError("the road has no driving lane that tracks could lie in", path=network.path)
-    x, y = network.header_offset.undo(tracks.x, tracks.y)
-    heading = tracks.heading - network.header_offset.heading
-    place = network.world_to_lane(x, y, heading=heading)
-    piece, along = np.full(len(tracks.x), -1), np.zeros(len(tracks.x))
-    inside = np.flatnonzero((place.distance <= 0.0) & (place.lane != 0))
-    road, lane, s = place.road[inside], place.lane[inside], place.s[inside]
-    number = np.array([network.roads[r].section_number(at) for r, at in zip(road.tolist(), s.tolist(), strict=True)])
-    for index, k, name in sorted(set(zip(road.tolist(), number.tolist(), lane.tolist(), strict=True))):
-        mine = (road == index) & (number == k) & (lane == name)
-        section, forward = network.roads[index].sections[k], network.travel_direction(index, name) > 0
-        piece[inside[mine]] = pieces.get((index, k, name), -1)
-        along[inside[mine]] = s[mine] - section.start if forward else section.end - s[mine]
-    there = np.flatnonzero(piece >= 0)
-    where = place.road[there], place.lane[there], place.s[there]
-
-    def known(values: NDArray[Any]) -> FloatArray:
-        column = np.full(len(piece), np.nan)
-        column[there] = values
-        return column
-
-    names = ("curvature", "lane_index", "lane_count", "crossfall", "grade")
-    values: list[NDArray[Any]]
-    values = [network.lane_curvature(*where), *network.lane_index(*where), *network.lean(*where)]
-    columns = dict(zip(names, map(known, values), strict=True))
-    offset, width = np.where(piece >= 0, place.offset, np.nan), known(network.lane_width(*where))
-    agreement = known(np.cos(heading[there] - network.lane_to_world(*where).heading))
-    scale = known(1.0 - network.curvature(where[0], where[2]) * network.lane_centre_t(*where))
-    return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, np.nan_to_num(scale, nan=1.0)), graph
-
-
-def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:
-    """Driving lanes of all sections, and how they hang together."""
-    pieces: dict[Piece, int] = {}
-    length = []
-    for index, road in enumerate(network.roads):
-        for k, section in enumerate(road.sections):
-            for lane in section.lanes:
-                if lane.type in DRIVING:
-                    pieces[index, k, lane.id] = len(pieces)
-                    length.append(section.end - section.start)
-    left, following = np.full(len(pieces), -1), list[list[int]]()
-    for (index, k, name), number in pieces.items():
-        forward = network.travel_direction(index, name) > 0
-        other = beside(name, 1 if forward else -1)
-        if network.travel_direction(index, other) == network.travel_direction(index, name):
-            left[number] = pieces.get((index, k, other), -1)
-        section = network.roads[index].sections[k]
-        end = section.end - INTO_NEXT if forward else section.start + INTO_NEXT
-        step = network.advance(index, name, end, 2 * INTO_NEXT)
-        next_piece = step.road, network.roads[step.road].section_number(step.s), step.lane
-        ahead = pieces.get(next_piece, number) if step.remaining <= 0.0 else number
-        following.append([] if ahead == number else [ahead])
-    return pieces, LaneGraph(np.array(length), left, following)
+    n, names = len(tracks.x), ("curvature", "lane_index", "lane_count", "crossfall", "grade")
+    piece, along, scale = np.full(n, -1), np.zeros(n), np.ones(n)
+    offset, width, agreement, *values = (np.full(n, np.nan) for _ in range(3 + len(names)))
+    columns = dict(zip(names, values, strict=True))
+    for rows in blocks(n):
+        x, y = network.header_offset.undo(tracks.x[rows], tracks.y[rows])
+        heading = tracks.heading[rows] - network.header_offset.heading
+        place = network.world_to_lane(x, y, heading=heading)
+        inside = np.flatnonzero((place.distance <= 0.0) & (place.lane != 0))
+        number, way = lanes.place(place.road[inside], place.lane[inside], place.s[inside])
+        on, inside = number >= 0, inside[number >= 0]
+        where, there = (place.road[inside], place.lane[inside], place.s[inside]), rows.start + inside
+        piece[there], along[there], offset[there] = number[on], way[on], place.offset[inside]
+        width[there] = network.lane_width(*where)
+        agreement[there] = np.cos(heading[inside] - network.lane_to_world(*where).heading)
+        scale[there] = 1.0 - network.curvature(where[0], where[2]) * network.lane_centre_t(*where)
+        seen = network.lane_curvature(*where), *network.lane_index(*where), *network.lean(*where)
+        for column, part in zip(values, seen, strict=True):
+            column[there] = part
+    return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, scale), lanes.graph
 
 
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
@@ -180,13 +146,14 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     jump = same & (np.abs(step) > 0.5 * placed.lane_width)
     lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
     sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
+    del step, same, jump
     columns = {
-        "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+        "drive": pd.Series(tracks.names, dtype=str).take(tracks.vehicle).array,
         "time": np.round(tracks.time, 4),
         "offset": placed.offset,
         "lane_width": placed.lane_width,
         "speed": tracks.speed,
-        "acceleration": rate(tracks.speed, tracks.vehicle, tracks.time, tracks.step, 1.0),
+        "acceleration": rate(tracks.speed, tracks.time, 1.0, whose=tracks.vehicle),
         **placed.road,
         **near,
     }

@@ -157,14 +157,25 @@ class Autoregression(Record, frozen=True, eq=False):
 
     def power(self, frequency: FloatArray) -> FloatArray:
         """Spectral density at frequencies [cycles per step], shape (n,), 0 to 0.5; white noise of variance 1 has 1."""
-        lags = np.arange(1, self.order + 1)
-        gain = 1.0 - np.exp(-2j * np.pi * np.outer(frequency, lags)) @ self.coefficients
+        turns = _turns_on_grid(self.order) if frequency is FREQUENCIES else _turns(frequency, self.order)
+        gain = 1.0 - turns @ self.coefficients
         return np.asarray(self.scale**2 / np.abs(gain) ** 2)
 
     def covariance(self, n_lags: int) -> FloatArray:
         """Autocovariance at lags 0 to n_lags - 1 steps, shape (n_lags,), n_lags <= `GRID` / 2. [square of the unit]"""
         power = self.power(FREQUENCIES)
         return np.asarray(np.fft.irfft(power, GRID)[:n_lags])
+
+
+def _turns(frequency: FloatArray, order: int) -> NDArray[np.complex128]:
+    """By how much waves turn in one step and more, shape (n, order). [-]"""
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, np.arange(1, order + 1))))
+
+
+@lru_cache(maxsize=8)
+def _turns_on_grid(order: int) -> NDArray[np.complex128]:
+    """The same at `FREQUENCIES`, a megabyte for the usual order: fits ask for it hundreds of times."""
+    return _turns(FREQUENCIES, order)
 
 
 def stabilise(coefficients: FloatArray) -> FloatArray:
@@ -268,6 +279,8 @@ class DriverState(msgspec.Struct):
 def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
     """Draw n drivers from the population; given a start, each from those found there."""
     coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
+    if start is None:  # nothing to choose by
+        coarse_normal, fine_normal = coarse_normal[:, :1], fine_normal[:, :1]
     coarse = _factor(model.coarse_volatility.between, coarse_normal)
     mixed = model.correlation * coarse_normal + np.sqrt(1.0 - model.correlation**2) * fine_normal
     fine = _factor(model.fine_volatility.between, mixed)
