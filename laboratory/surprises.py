@@ -1,10 +1,10 @@
-"""What a driver does where context changes suddenly: each column of each shipped profile stepped, in Python and in C.
+"""What a driver does where context changes suddenly: each column of each shipped profile stepped, in Python, C and FMU.
 
-    python -m laboratory.surprises [--seeds 100] [--speed 33] [--no-c]
+    python -m laboratory.surprises [--seeds 100] [--speed 33] [--no-c] [--fmu]
 
 For 30 s the context stays, at 15 s one column steps. Per column, over all profiles, steps and seeds: the largest
 lateral speed and, at 20 Hz, acceleration from then on; in the first line nothing steps. The same drivers in Python
-(`Traffic`) and in C (`export c`), and how far they are apart.
+(`Traffic`), in C (`export c`) and, with `--fmu`, in a unit of FMI 3.0 (`export fmu`), and how far they are apart.
 """
 
 from __future__ import annotations
@@ -44,8 +44,41 @@ def offsets(profile: xl.DriverProfile, seeds: int, column: str, to: float, speed
     return stepped_offsets(profile, seeds, round(SECONDS / STEP), STEP, context_at)[0]
 
 
-def compiled(driver: CompiledDriver, seeds: int, column: str, to: float, speed: float) -> np.ndarray:
-    """The same in C."""
+class UnitDriver:
+    """One driver in an FMU, called as `CompiledDriver` is."""
+
+    def __init__(self, profile: xl.DriverProfile, folder: Path) -> None:
+        import fmpy
+
+        unit = folder / "driver.fmu"
+        xl.export_fmu(profile, unit, fmi="3.0")
+        described = fmpy.read_model_description(str(unit))
+        self._one = fmpy.instantiate_fmu(fmpy.extract(str(unit), str(folder / "unit")), described, "CoSimulation")
+        self._number = {variable.name: variable.valueReference for variable in described.modelVariables}
+        self.columns = inputs_of(profile)
+
+    def start(self, seed: int) -> None:
+        """Begin anew."""
+        self._one.reset()
+        self._seed, self._last = seed, 0.0
+
+    def step(self, time: float, values: dict[str, float]) -> list[float]:
+        """The offset; inputs are there at the step's end."""
+        one = self._one
+        if time <= 0.0:
+            one.enterInitializationMode(startTime=0.0)
+            one.setInt32([self._number["seed"]], [self._seed])
+        one.setFloat64([self._number[name] for name in self.columns], [float(values[name]) for name in self.columns])
+        if time <= 0.0:
+            one.exitInitializationMode()
+        else:
+            one.doStep(currentCommunicationPoint=self._last, communicationStepSize=time - self._last)
+        self._last = time
+        return list(one.getFloat64([self._number["offset"]]))
+
+
+def compiled(driver: CompiledDriver | UnitDriver, seeds: int, column: str, to: float, speed: float) -> np.ndarray:
+    """The same in C, or in an FMU."""
     rows = []
     for seed in range(1, seeds + 1):
         driver.start(seed)
@@ -65,28 +98,30 @@ def main() -> None:
         "--profiles", nargs="*", default=["motorway", "motorway-refined", "motorway-vehicle-3", "rural"]
     )
     parser.add_argument("--no-c", action="store_true")
+    parser.add_argument("--fmu", action="store_true")
     given = parser.parse_args()
     worst: dict[str, list[float]] = {}
     for name in given.profiles:
         profile = xl.read_profile(name)
         with tempfile.TemporaryDirectory() as folder:
-            driver = None if given.no_c else CompiledDriver(profile, Path(folder))
+            drivers = [*([] if given.no_c else [CompiledDriver(profile, Path(folder))]),
+                       *([UnitDriver(profile, Path(folder))] if given.fmu else [])]  # fmt: skip
             known = inputs_of(profile)
             cases = [("", 0.0), *((column, to) for column, values in STEPS.items() if column in known for to in values)]
             for column, to in cases:
                 moved = offsets(profile, given.seeds, column, to, given.speed)
-                apart = 0.0
-                if driver is not None:
-                    own = compiled(driver, given.seeds, column, to, given.speed)
-                    apart = float(np.abs(own - moved).max())
+                others = (compiled(driver, given.seeds, column, to, given.speed) for driver in drivers)
+                apart = max((float(np.abs(own - moved).max()) for own in others), default=0.0)
                 later = moved[round(AT / STEP) :]
                 found = [np.abs(np.diff(later, axis=0)).max() / STEP, np.abs(np.diff(later, 2, axis=0)).max() / STEP**2]
                 row = worst.setdefault(column or "nothing", [0.0, 0.0, 0.0])
                 worst[column or "nothing"] = [max(pair) for pair in zip(row, [*map(float, found), apart], strict=True)]
-    print(f"| stepped, at {given.speed:g} m/s | lateral speed [m/s] | acceleration [m/s2] | Python and C apart [m] |")
+    print(
+        f"| stepped, at {given.speed:g} m/s | speed aside [m/s] | acceleration [m/s2] | Python and compiled apart [m] |"
+    )
     print("|---|---|---|---|")
     for column, (speed, acceleration, apart) in worst.items():
-        print(f"| {column} | {speed:.2f} | {acceleration:.2f} | {'' if given.no_c else f'{apart:.0e}'} |")
+        print(f"| {column} | {speed:.2f} | {acceleration:.2f} | {'' if not drivers else f'{apart:.0e}'} |")
 
 
 if __name__ == "__main__":

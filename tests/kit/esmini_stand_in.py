@@ -13,6 +13,7 @@ from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.live.esmini import LATERAL_ACTIONS
 from xosc_lateral.workflows.live.esmini_library import ObjectState
 from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
 
 STEP = 0.01
 
@@ -63,7 +64,9 @@ class StandIn:
                     action = after or before
                     path = "::".join(action.path).encode()
                     self.callback(action.path[-1].encode(), 7, 2 if after else 3, path)
-                if after is not None:  # the maneuver takes the car from where it is
+                if after is not None and isinstance(after.action.content, FollowTrajectoryAction):
+                    self.offset[name] = 0.0  # a trajectory puts it where that begins
+                elif after is not None:  # the maneuver takes the car from where it is
                     self.offset[name] = self.offset.get(name, 0.0) * (
                         1.0 - STEP / max(after.end - self.row * STEP, STEP)
                     )

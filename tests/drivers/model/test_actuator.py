@@ -12,7 +12,7 @@ from tests.kit.compiled import CompiledDriver
 from tests.kit.stepped import stepped_offsets
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.model.actuator import drivable_step, fault_in_words, pay_off, stopping_speed
-from xosc_lateral.drivers.model.effects import Step
+from xosc_lateral.drivers.model.effects import Cycle, Step
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile, write_profile
 from xosc_lateral.workflows.live.c_numbers import inputs_of
@@ -99,6 +99,21 @@ def test_movement_that_cannot_be_driven_stays_near_the_lane_and_is_named() -> No
     assert np.abs(moved).max() <= 1.5 * 3.5 + 1e-9
     assert np.abs(moved[700:]).max() < 0.1  # back to the lane's centre
     assert set(traffic.faults.values()) == {fault_in_words(profile, len(profile.effects) + 1)}
+
+
+def test_who_would_cross_the_lane_too_fast_is_held_to_a_heading_that_can_be_driven(tmp_path: Path) -> None:
+    """Weaving over 9 m within 10 s: no acceleration that a tyre lacks the grip for, but 15 degrees at 40 km/h."""
+    profile = read_profile("motorway-refined").with_effects(Cycle(amplitude=4.5, period_s=10.0))
+    moved, traffic = driven(profile, 30.0, 40.0)
+    turned = np.abs(np.diff(moved[round(2.0 / STEP) :], axis=0)).max() / STEP / 11.2
+    assert 0.14 < turned < 0.18 and np.abs(moved).max() <= 1.5 * 3.5
+    assert set(traffic.faults.values()) == {fault_in_words(profile, len(profile.effects) + 1)}
+    driver = CompiledDriver(profile, tmp_path)
+    driver.start(1)
+    values = {name: USUAL.get(name, np.inf) for name in driver.columns}
+    own = [driver.step(k * STEP, values)[0] for k in range(len(moved))]
+    np.testing.assert_allclose(own, moved[:, 0], rtol=0.0, atol=1e-9)
+    assert driver.fault()[0] == len(profile.effects) + 1
 
 
 def test_a_profile_is_tried_over_its_columns_where_it_is_read(tmp_path: Path) -> None:

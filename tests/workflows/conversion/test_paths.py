@@ -127,3 +127,15 @@ def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turnin
     assert "is turned by 0.30 rad" in seen(heading_relative=car.heading_relative + np.where(later, 0.3, 0.0))[0]
     road = np.where(car.road == 2, 1, car.road).astype(np.int32)
     assert "drives onto road '2' as number 2" in seen(road=road)[0]
+
+
+def test_a_path_turns_a_car_that_a_stopped_lane_change_leaves_turned_by_and_by(tmp_path: Path) -> None:
+    """The player moves it on as it is turned; it is straightened over 0.1 s, not in a frame."""
+    made = {name: (road, text) for name, road, text in reactive.reactive_scenarios()}
+    road, text = made["act stopped half-way"]
+    (tmp_path / "road.xodr").write_text(road)
+    (tmp_path / "scenario.xosc").write_text(text)
+    xl.convert(tmp_path / "scenario.xosc", tmp_path / "out.xosc", ego=["Ego"], seed=3)
+    source, car = _car(tmp_path / "scenario.xosc"), _car(tmp_path / "out.xosc")
+    assert abs(np.sin(source.heading_relative[-1])) > 0.02 > 0.01 > abs(np.sin(car.heading_relative[-1]))
+    assert np.abs(np.diff(np.unwrap(car.heading))).max() < 0.008  # in 0.02 s

@@ -13,6 +13,19 @@ import pytest
 
 import xosc_lateral as xl
 from tests.kit.esmini_stand_in import StandIn
+from tests.kit.scenario_files import (
+    action,
+    entity,
+    event,
+    private,
+    scenario_text,
+    speed_action,
+    story,
+    teleport,
+    time_condition,
+    write_scenario,
+)
+from tests.kit.stage import follow, polyline
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -54,6 +67,22 @@ def test_vehicles_are_where_their_drivers_say_and_maneuvers_stay_as_written(libr
     turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(back.y), np.diff(back.x)))))
     road = np.abs(np.diff(np.unwrap(back.h)))[1:]
     assert (turned - road).max() < LARGEST_TURN_RATE * 0.02
+
+
+def test_an_offset_is_led_out_where_a_trajectory_starts_without_it(library: Any, tmp_path: Path) -> None:
+    """In the middle of the lane from 4 s on, for 10 s."""
+    at = [f'<LanePosition roadId="1" laneId="-1" s="{s}"/>' for s in range(150, 401, 10)]
+    way = polyline(*((0.4 * k, one) for k, one in enumerate(at)))
+    text = scenario_text(
+        entities=entity("Car"), init=private("Car", teleport(), speed_action("25")), stop=time_condition(12),
+        stories=story(event("way", action("way", follow(way)), time=4.0), actors=("Car",)),
+    )  # fmt: skip
+    run = live_esmini(write_scenario(tmp_path, text), library, ego=["none"], seed=3, duration=12.0, step=0.01)
+    frame = run.to_frame()
+    assert not run.warnings and frame.steered[frame.time < 3.9].all()
+    own = frame.offset.to_numpy()
+    assert abs(own[399]) > 0.05 and np.abs(own[1100:]).max() < 1e-6
+    assert np.abs(np.diff(own[::5], 2)).max() / 0.05**2 < 1.0
 
 
 def test_a_run_is_a_trace_with_the_road_and_where_everybody_was(library: Any, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.kit.stage import Stage, arc, car, line, map_of, road
@@ -66,6 +67,27 @@ def world(tmp_path: Path) -> World:
 
 def distance(world: World, own: EntityState, other: EntityState, system, kind, *, freespace: bool = False):
     return Measure(system, kind, freespace).to_entity(own, other)
+
+
+@pytest.mark.parametrize("freespace", [False, True])
+def test_what_is_far_need_not_be_exact_and_what_may_be_near_is(world: World, freespace: bool) -> None:
+    """Cars on an arc that drive, turn and are put elsewhere at random, beside the same measured each time."""
+    rng, kept = np.random.default_rng(1), Measure(ROAD, AHEAD, freespace)
+    own, other = world.put(0, -1, 100.0, on=2), world.put(1, -1, 180.0, on=2)
+    measured = 0
+    for k in range(3000):
+        for car_, speed in ((own, 0.4), (other, 0.3)):
+            s = (car_.s + speed * rng.uniform(0.0, 1.0)) % 300.0
+            offset = float(np.clip(car_.offset_t + 0.05 * rng.standard_normal(), -1.5, 1.5))
+            anew = rng.uniform() < 0.003
+            car_.move_to(2, car_.lane, float(rng.uniform(0.0, 300.0)) if anew else s, offset)
+            car_.turn(0.2 * np.sin(0.01 * k))
+        enough = float(rng.choice([0.0, 5.0, 20.0, 60.0]))
+        exact = distance(world, own, other, ROAD, AHEAD, freespace=freespace)
+        gap = kept.to_entity(own, other, enough=enough)
+        assert gap == exact if abs(exact) <= enough else abs(gap) > enough
+        measured += gap == exact
+    assert measured < 1500
 
 
 # ---- in the entity's own frame ---------------------------------------------------------------------------------------

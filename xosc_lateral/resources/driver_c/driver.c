@@ -690,7 +690,8 @@ static double sample_at(DRIVER_state *driver, int64_t row) {
     }
     wanted -= driver->owed;
     if (foresees == 0 && is_wild == 0 && row >= 2
-        && fabs(wanted - 2.0 * s[3] + s[2]) > IMPOSSIBLE_ACCELERATION * (DRIVER_STEP * DRIVER_STEP)) {
+        && (fabs(wanted - 2.0 * s[3] + s[2]) > IMPOSSIBLE_ACCELERATION * (DRIVER_STEP * DRIVER_STEP)
+            || fabs(wanted - s[3]) > LARGEST_SPEED * DRIVER_STEP)) {
         driver->fault = DRIVER_MOVEMENT_FAULT;
     }
     if (driver->fault != 0) {

@@ -201,7 +201,7 @@ def check(plan: Plan, written: Written) -> Written:
 
     def attempt(
         paths: Sequence[OffsetPath], most: float
-    ) -> tuple[tuple[Written, Scenario, NominalMotion], list[Comparison]]:
+    ) -> tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]:
         trial = written
         if paths is not written.paths:  # those of the first trial are written already
             trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
@@ -215,6 +215,7 @@ def check(plan: Plan, written: Written) -> Written:
 
     (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
+    assert run is not None  # what is taken was played in all runs
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
     warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
     if settings.player_library is not None:

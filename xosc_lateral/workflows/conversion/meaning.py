@@ -6,7 +6,7 @@ take longer or shorter from beside the middle explain (`shifts`). Otherwise move
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import TypeVar
@@ -60,9 +60,8 @@ STANDING_TIME = 2.0
 CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 """How fast they do so. [m/s2]"""
 
-LONGER = 1.5
-"""Times the longest of these runs, for which offsets last: an ego at 0.7 times its speed comes to a place after 1.43
-times as long, one at 0.8 times after 1.25 times. [-]"""
+LONGER = 1.3
+"""Times the longest of these runs, for which offsets last: some egos come to a place later still. [-]"""
 LEAST_TIME = 60.0
 """For which they do at least: where an end hangs on what a vehicle under test does, it may come late. [s]"""
 TRIAL_STEP = 0.05
@@ -99,15 +98,15 @@ Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
 
 
-OTHER_RUNS = ("ego at 0.8 times its speed", "ego at 1.2 times its speed", "ego that brakes to a stop")  # of `_drives`
+OTHER_RUNS = ("ego at 0.7 times its speed", "ego at 1.3 times its speed", "ego that brakes to a stop")  # of `_drives`
 
 
 def _drives(speed: float) -> tuple[Speeds, ...]:
     """Ways to drive, beside the nominal one: slower, faster, to a stop and on."""
     stopped = BRAKING_START + speed / BRAKING_RATE + STANDING_TIME
     return (
-        ((CHANGE_START, 0.8, CHANGE_RATE),),
-        ((CHANGE_START, 1.2, CHANGE_RATE),),
+        ((CHANGE_START, 0.7, CHANGE_RATE),),
+        ((CHANGE_START, 1.3, CHANGE_RATE),),
         ((BRAKING_START, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE)),
     )
 
@@ -122,7 +121,10 @@ class Meaning:
         last = max((one.start if one.end is None else one.end for one in motion.actions), default=0.0)
         until = last if self._is_cut_off else motion.end_time
         self.limit = min(inf if time_limit is None else time_limit, LONGEST_RUN * max(until, LEAST_DURATION))
-        self._before = list(self._runs(played.scenario))
+        initial = [float(one.speed[0]) for one in motion.entities if one.name in egos]
+        self._drives = ((), *(_drives(max(initial, default=0.0)) if egos else ()))
+        self._order = list(range(len(self._drives)))  # in which an output's runs are played
+        self._before = [self._run(played.scenario, k) for k in self._order]
         self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
 
     @property
@@ -145,34 +147,32 @@ class Meaning:
         runs = (one for _, motion in self._before for one in motion.entities if one.name == name)
         return self.longest_time * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
 
-    def _runs(self, scenario: Scenario) -> Iterator[tuple[Scenario, NominalMotion]]:
-        """Each run and what was played; all but the nominal one in coarser steps, until nothing is left to happen."""
-        source = self._played.scenario
-        if scenario is source and not self._is_cut_off:
-            yield scenario, self._played.motion
-        else:
-            yield scenario, play(scenario, self._played.network, step=self._step, time_limit=self.limit)
-        initial = [float(one.speed[0]) for one in self._played.motion.entities if one.name in self._egos]
-        for speeds in _drives(max(initial, default=0.0)) if self._egos else ():
-            driven = with_speeds(_ending_with(scenario, source), self._played.motion, self._egos, speeds)
-            step = max(self._step, TRIAL_STEP)
-            yield driven, play(driven, self._played.network, step=step, time_limit=self.limit)
+    def _run(self, scenario: Scenario, k: int) -> tuple[Scenario, NominalMotion]:
+        """The k-th run, and what was played; all but the nominal one in coarser steps, until nothing is left to do."""
+        source, motion, network = self._played.scenario, self._played.motion, self._played.network
+        if k == 0 and scenario is source and not self._is_cut_off:
+            return scenario, motion
+        if k == 0:
+            return scenario, play(scenario, network, step=self._step, time_limit=self.limit)
+        driven = with_speeds(_ending_with(scenario, source), motion, self._egos, self._drives[k])
+        return driven, play(driven, network, step=max(self._step, TRIAL_STEP), time_limit=self.limit)
 
     def compare(
         self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, most: float = inf
-    ) -> tuple[list[Comparison], NominalMotion]:
+    ) -> tuple[list[Comparison], NominalMotion | None]:
         """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
 
-        Each run with its own, as long as they differ in less than `most`; and the nominal run of the output.
+        Each run with its own, as long as they differ in less than `most`; and the nominal run of the output, if it was
+        played. What differed last is looked at first.
         """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
-        comparisons, played = list[Comparison](), list[NominalMotion]()
-        runs = zip((NOMINAL_RUN, *OTHER_RUNS), self._before, self._runs(scenario), strict=False)  # played as asked for
-        for name, (driven, before), (_, run) in runs:
-            played.append(run)
+        comparisons, nominal_run = dict[int, Comparison](), None
+        for k in self._order:
+            name, (driven, before), (_, run) = (NOMINAL_RUN, *OTHER_RUNS)[k], self._before[k], self._run(scenario, k)
+            nominal_run = run if k == 0 else nominal_run
             kept = (one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories)
             nominal = replace(before, actions=tuple(kept))
-            ends = name == NOMINAL_RUN or not gone  # else stories that others wait for may be gone
+            ends = k == 0 or not gone  # else stories that others wait for may be gone
             comparison = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
             if comparison.changes:
                 key = name, frozenset(trajectories)
@@ -184,10 +184,11 @@ class Meaning:
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
             changes = tuple(structs.replace(one, run=name) for one in (*comparison.changes, *movement))
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            comparisons.append(Comparison(shifts, changes, shares, name))
-            if len(_changes(comparisons)) >= most:
+            comparisons[k] = Comparison(shifts, changes, shares, name)
+            if len(_changes(comparisons.values())) >= most:
                 break
-        return comparisons, played[0]
+        self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
+        return [comparisons[k] for k in sorted(comparisons)], nominal_run
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
         """What a source itself does otherwise, and by how much, in other frames: two things that meet in one. [s]"""
@@ -335,7 +336,7 @@ def keep_meaning(
     return output, KeptMeaning(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
-def _changes(comparisons: Sequence[Comparison]) -> list[Change]:
+def _changes(comparisons: Iterable[Comparison]) -> list[Change]:
     """Each once."""
     return list({change.what: change for comparison in comparisons for change in comparison.changes}.values())
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.errors import FormatError, SimulationError
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
@@ -24,10 +24,9 @@ from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.live.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.workflows.live.esmini_places import Ledger, Place, Rest, ToldPlace
 from xosc_lateral.workflows.live.loop import Row
-from xosc_lateral.workflows.live.paths import LARGEST_TURN_RATE, LEADING_OVER_SHARE, Moves
+from xosc_lateral.workflows.live.paths import CLOCK_TOLERANCE, Moves, leading_time, left_of_gap
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.workflows.live.under_test import UnderTest
-from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,
@@ -61,9 +60,6 @@ oncoming lane, where a lane change across goes astray. [m]"""
 
 AT_REST = 1e-6
 """Of what stands, as the player has it, every way aside becomes a speed: nothing is reported. [m/s]"""
-
-_SAME_PLACE = 0.05
-"""A maneuver that moves a vehicle further in its first step puts it elsewhere, as a teleport does. [m]"""
 
 
 class EsminiTraffic:
@@ -165,33 +161,33 @@ class EsminiTraffic:
         return moves
 
     def settle(self, dt: float) -> None:
-        """Let the lateral speed that a maneuver has cut off at its start run out; after ``SE_StepDT(dt)``.
+        """Let what a maneuver has cut off at its start run out, offset and lateral speed; after ``SE_StepDT(dt)``.
 
-        A lateral action begins with no lateral speed, and says anew in every step where its vehicle is. What is
-        reported after a step is seen in the vehicle's state until the next one, and changes nothing of the action.
+        A lateral action begins with no lateral speed, a trajectory without offset, and both say anew in every step
+        where their vehicle is. What is reported after a step is seen in the vehicle's state until the next one, and
+        changes nothing of the action.
         """
         busy = self._busy()
         for name, state in self._objects():
             if (known := self._ledger.vehicles.get(name)) is None:
                 continue
+            pace = float(clock_rate(np.array([state.speed]))[0])
             if name in busy and known.steered:  # begun in this step, in which the driver's place still counts
-                if known.told_place is None or self._ledger.apart(known.told_place, state) > _SAME_PLACE:
+                if (gap := self._ledger.dropped(known, state)) is None:
                     continue
-                bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * max(abs(state.speed), MINIMUM_SPEED)
-                known.rest = Rest(known.rate, max(SETTLING_TIME, 4.0 * abs(known.rate) / bound))
+                rate = known.rate / max(pace, CLOCK_TOLERANCE)
+                known.rest = Rest(gap, rate, float(leading_time(*np.array([gap, rate, state.speed]))), -dt * pace)
             elif self._ledger.road_of(state) < 0 or (name not in busy and name not in self._touched):
                 known.rest = None
-            elif (
-                known.rest is not None and abs(state.speed) > AT_REST
-            ):  # once more when the action is over: from there on the driver leads over
-                rest = known.rest
-                rest.passed += dt
-                rest.way = float(settle(np.array([rest.passed]), rest.over, rest.rate, 0.0)[0])
+            # once more when the action is over: from there on the driver leads over
+            if (rest := known.rest) is not None and (rest.gap or abs(state.speed) > AT_REST):
+                rest.passed += dt * pace
+                left = left_of_gap(*np.array([[rest.passed / rest.over], [rest.over], [rest.gap], [rest.rate]]))
                 room = self._ledger.room_to_middle(state)
-                rest.way *= float(smooth_step(np.array([min(max(room / MIDDLE, 0.0), 1.0)]))[0])
-                if room > 0.0:
-                    left = self._ledger.left_of(state)
-                    self.player.SE_ReportObjectLateralPosition(state.id, state.t + left * rest.way)
+                rest.way = float(left[0] * smooth_step(np.array([min(max(room / MIDDLE, 0.0), 1.0)]))[0])
+                if room > 0.0 and rest.way:
+                    t = state.t + self._ledger.left_of(state) * rest.way
+                    self.player.SE_ReportObjectLateralPosition(state.id, t)
 
     # ---- a simulation that runs by itself (`loop`) -------------------------------------------------------------------
     def time(self) -> float:
@@ -228,10 +224,11 @@ class EsminiTraffic:
     # ---- what is told ------------------------------------------------------------------------------------------------
     def _tell(self, name: str, state: ObjectState, t: float) -> None:
         """Report a place [m], and the speed that there is; who stands is where he is."""
-        if abs(state.speed) <= AT_REST:
-            return
-        self.player.SE_ReportObjectSpeed(state.id, state.speed)
-        self.player.SE_ReportObjectLateralPosition(state.id, t)
+        if abs(state.speed) > AT_REST:
+            self.player.SE_ReportObjectSpeed(state.id, state.speed)
+            self.player.SE_ReportObjectLateralPosition(state.id, t)
+        else:
+            t = state.t
         offset_t = state.offset_t + t - state.t
         self._ledger.vehicles[name].told_place = ToldPlace(self._ledger.road_of(state), state.lane, t, offset_t)
 

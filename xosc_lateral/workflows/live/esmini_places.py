@@ -25,15 +25,19 @@ LANE_STEP = 0.5
 MOVED, RESTING = 0.01, 0.2
 """A vehicle farther from where it was told to be is moved by somebody else [m], until it has kept still so long [s]."""
 
+SAME_PLACE = 0.05
+"""A maneuver that moves a vehicle further in its first step starts without the driver's offset, or elsewhere. [m]"""
+
 KEPT_PLACE = 1e-6
 """So well does a vehicle keep its place in the lane that nobody moves. [m]"""
 
 
 @dataclass(slots=True)
 class Rest:
-    """What is left of the lateral speed at a maneuver's start."""
+    """What is left of a driver's lateral speed, and of his offset where a trajectory starts without it."""
 
-    rate: float  # At its start. [m/s]
+    gap: float  # From where the maneuver has put the vehicle, when it started. [m]
+    rate: float  # Then, by the driver's own clock, as all that follows. [m/s]
     over: float  # It runs out over so long. [s]
     passed: float = 0.0  # [s]
     way: float = 0.0  # Beside the maneuver so far. [m]
@@ -120,6 +124,14 @@ class Ledger:
             )
         apart = abs(state.t - told_place.t)
         return float(min(apart, abs(state.offset_t - told_place.offset_t)) if state.lane == told_place.lane else apart)
+
+    def dropped(self, known: Vehicle, state: ObjectState) -> float | None:
+        """The driver's offset that a maneuver has dropped as it started; None: it has put the vehicle elsewhere. [m]"""
+        if (told_place := known.told_place) is None or self.apart(told_place, state) <= SAME_PLACE:
+            return None if told_place is None else 0.0
+        own = (known.place or 0.0) - (known.base or 0.0)
+        is_near = self.apart(told_place._replace(t=told_place.t - self.left_of(state) * own), state) < LANE_STEP
+        return own if is_near else None
 
     def room_to_middle(self, state: ObjectState) -> float:
         """How far a vehicle is from lane 0, on the side of the lane that it is on; below 0: it is across. [m]"""

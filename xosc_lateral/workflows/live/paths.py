@@ -137,10 +137,21 @@ def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
     """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no corner at this speed. [m/s]"""
-    bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * np.maximum(np.abs(speed), MINIMUM_SPEED)
-    over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(STEP_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
+    over = leading_time(gap, rate, speed)
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])
+
+
+def leading_time(gap: FloatArray, rate: FloatArray, speed: FloatArray) -> FloatArray:
+    """How long that takes, shape (n,). [s]"""
+    bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * np.maximum(np.abs(speed), MINIMUM_SPEED)
+    ways = np.maximum(np.sqrt(STEP_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound)
+    return np.asarray(np.maximum(SETTLING_TIME, ways))
+
+
+def left_of_gap(u: FloatArray, over: FloatArray, gap: FloatArray, rate: FloatArray) -> FloatArray:
+    """What is left of a gap [m] at a share of the time that leading over takes [s], shape (n,). [m]"""
+    return np.asarray(gap * (1.0 - smoother_step(u)) + settle(u * over, over, rate, 0.0))
 
 
 def _settle(state: NDArray[Any], passed: FloatArray) -> FloatArray:
@@ -154,9 +165,8 @@ def _settle(state: NDArray[Any], passed: FloatArray) -> FloatArray:
     done = active & (share >= 1.0)
     state["share"], state["over"] = np.where(active, share, 0.0), np.where(done, 0.0, state["over"])
     u = np.clip(share, 0.0, 1.0)
-    level = 1.0 - smoother_step(u)
     by_level = -30.0 * u**2 * (1.0 - u) ** 2 / over
     by_slope = 1.0 - 18.0 * u**2 + 32.0 * u**3 - 15.0 * u**4
-    rest = state["from"] * level + settle(u * over, over, state["from_rate"], 0.0)
+    rest = left_of_gap(u, over, state["from"], state["from_rate"])
     state["rest"] = np.where(active & ~done, rest, 0.0)
     return np.where(active & ~done, state["from"] * by_level + state["from_rate"] * by_slope, 0.0)

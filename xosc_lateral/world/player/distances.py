@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import copysign, cos, hypot, inf, sin
+from typing import NamedTuple
 
-from msgspec import Struct
+from msgspec import Struct, field
 from msgspec.structs import replace
 
 from xosc_lateral.world.player.drive import drawn_by
@@ -23,10 +24,13 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.lanes import lanes_between
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.positions import RoadPath
+from xosc_lateral.world.road.positions import Pose, RoadPath
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
 
 _ALONG_ROADS = (CoordinateSystem.ROAD, CoordinateSystem.LANE)
+
+MARGIN = 1e-3
+"""Beyond what would be enough: more than what a comparison tolerates, of times too, up to 300 m/s. [m]"""
 
 UNREACHABLE_DISTANCE = 1e10
 """Distance where there is no way from one to the other. [m]"""
@@ -134,49 +138,79 @@ def _across(here: Spot, spot: Spot, path: RoadPath) -> float:
     return spot.t - (-here.t if path.is_turned else here.t)
 
 
-class Measure(Struct, frozen=True):
+class _Seen(NamedTuple):
+    """A gap along the roads that was measured [m]; who was where then, and how far each may go on its road [m]."""
+
+    gap: float
+    poses: tuple[Pose, Pose]
+    rooms: tuple[float, float]
+
+
+class Measure(Struct, frozen=True, eq=False):
     """How a distance is measured, between boxes or reference points; None where no way leads along the roads."""
 
     system: CoordinateSystem
     kind: RelativeDistanceType
     freespace: bool = False
-    enough: float = inf  # beyond it, free space along roads need not be exact [m]
+    seen: dict[tuple[str, str], _Seen] = field(default_factory=dict)  # by the names of who and whom
 
     @property
     def is_along_roads(self) -> bool:
         """Whether it needs road coordinates."""
         return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
 
-    def between(self, state: EntityState, target: Spot | EntityState) -> float:
-        """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]"""
-        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target)
+    def between(self, state: EntityState, target: Spot | EntityState, *, enough: float = inf) -> float:
+        """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]
+
+        `enough`: what is farther, ahead or behind, need not be exact [m]
+        """
+        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target, enough)
         return UNREACHABLE_DISTANCE if gap is None else gap
 
-    def _to_train(self, state: EntityState, target: EntityState) -> float | None:
+    def _to_train(self, state: EntityState, target: EntityState, enough: float) -> float | None:
         """Free space is that of the nearest two."""
-        pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)]
-        if not self.freespace or len(pairs) == 1:
-            return self.to_entity(state, target)
+        pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)] if self.freespace else []
+        if len(pairs) < 2:
+            return self.to_entity(state, target, enough=enough)
         nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
-        gaps = [nearness.to_entity(*pair) for pair in pairs]
+        gaps = [nearness.to_entity(*pair, enough=enough) for pair in pairs]
         gap, nearest = min(zip(gaps, pairs, strict=True), key=lambda each: inf if each[0] is None else abs(each[0]))
         return gap if nearness is self else self.to_entity(*nearest)
 
-    def to_entity(self, state: EntityState, other: EntityState) -> float | None:
-        """From one entity to another. [m]"""
+    def to_entity(self, state: EntityState, other: EntityState, *, enough: float = inf) -> float | None:
+        """From one entity to another, exact up to `enough`. [m]"""
+        may_be_far = enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL
+        if may_be_far and (least := self._at_least(state, other)) > enough + MARGIN:
+            return least
         if not self.freespace:
-            if self.is_along_roads:
-                return self.to_spot(state, spot_of(other))
             pose = other.plane
-            return self.to_spot(state, Spot(pose.x, pose.y))
-        if not self.is_along_roads:
+            gap = self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(pose.x, pose.y))
+        elif not self.is_along_roads:
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
-        if overlap(state, other):
+        elif overlap(state, other):
             return 0.0
-        away, sizes = apart(state, other.plane.x, other.plane.y), (_reach(state), _reach(other))
-        if self.kind is RelativeDistanceType.LONGITUDINAL and away > 2.0 * (self.enough + sum(sizes)):
-            return away  # no road bends so much that it is half as far along its reference line
-        return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
+        else:
+            gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
+        if may_be_far and gap is not None:
+            rooms = _room(state), _room(other)
+            self.seen[state.name, other.name] = _Seen(gap, (state.plane, other.plane), rooms)
+        return gap
+
+    def _at_least(self, state: EntityState, other: EntityState) -> float:
+        """How far away it is at least, ahead or behind: by where both are, or by how far each has gone since. [m]
+
+        No road bends so much that a way is half as long along its reference line.
+        """
+        sizes = (_reach(state), _reach(other)) if self.freespace else (0.0, 0.0)
+        least = 0.5 * apart(state, other.plane.x, other.plane.y) - sum(sizes)
+        if (seen := self.seen.get((state.name, other.name))) is None:
+            return least
+        gone = [
+            2.0 * (apart(one, then.x, then.y) + size * abs(one.plane.heading - then.heading))
+            for one, then, size in zip((state, other), seen.poses, sizes, strict=True)
+        ]
+        is_known = all(way < room for way, room in zip(gone, seen.rooms, strict=True))
+        return max(least, abs(seen.gap) - sum(gone)) if is_known else least
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
         """From an entity to a spot. [m]"""
@@ -269,6 +303,14 @@ Point = tuple[float, float]
 
 HEIGHT_APART = 2.5
 """Entities further apart than this in z are on different levels of the road: they don't touch. [m]"""
+
+
+def _room(state: EntityState) -> float:
+    """How far an entity may go with all its box on the road that it is on; none within junctions. [m]"""
+    state.locate()
+    if state.road == NO_ROAD or (road := state.network.roads[state.road]).junction is not None:
+        return 0.0
+    return min(state.s, road.length - state.s) - 2.0 * _reach(state)
 
 
 def _reach(state: EntityState) -> float:

@@ -28,7 +28,7 @@ from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, driven_from_the_start, gives
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
-from xosc_lateral.world.scenario.private_actions import LATERAL, TeleportAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, FollowTrajectoryAction, TeleportAction
 from xosc_lateral.world.scenario.scenario import Scenario
 
 PATH_NAME = "xosc-lateral offsets"
@@ -88,7 +88,9 @@ def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Dra
     private = lateral.getparent()
     assert private is not None
     routing = etree.Element("RoutingAction")
-    _follow(build.sub(routing, "FollowTrajectoryAction"), name, path, path.pieces[0], draft)
+    _follow(
+        build.sub(routing, "FollowTrajectoryAction"), name, draft, _vertices(path, path.pieces[0], keeps_heading=False)
+    )
     place = private.index(lateral)
     private.remove(lateral)
     build.insert_indented(private, place, routing)
@@ -126,13 +128,13 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
     for _ in range(count):
         act = build.sub(story, "Act", name=f"{PATH_NAME} {len(story) + 1}")
         name = str(act.get("name"))
-        _add_pieces(act, name, path, draft)
+        _add_pieces(act, name, path, draft, is_turned=begun_by is not None and begun_by.turns)
         _add_start(act, path, begun_by, before, draft.version)
         _add_stop(act, name, path, [one for one in actions if one is not begun_by or one.repeats])
         before = name
 
 
-def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
+def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft, *, is_turned: bool) -> None:
     """A trajectory each: the reference player finds the places of vertices when it starts, so it may run once."""
     maneuver, begins = build.maneuver(act, f"{name} path", path.entity), ("act", name, "runningState")
 
@@ -149,7 +151,8 @@ def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft) 
     for number, piece in enumerate(path.pieces, start=1):
         wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
         follow = build.sub(event(number, wait), "RoutingAction/FollowTrajectoryAction")
-        _follow(follow, f"{name}.{number}", path, piece, draft)
+        keeps_heading = number == 1 and is_turned and path.settles is None
+        _follow(follow, f"{name}.{number}", draft, _vertices(path, piece, keeps_heading=keeps_heading))
 
 
 def _settle(action: etree._Element, path: OffsetPath, aside: float, within: float) -> None:
@@ -160,19 +163,19 @@ def _settle(action: etree._Element, path: OffsetPath, aside: float, within: floa
     build.sub(change, "LaneChangeTarget/RelativeTargetLane", entityRef=path.entity, value="0")
 
 
-def _follow(follow: etree._Element, name: str, path: OffsetPath, piece: PathPiece | Bridge, draft: Draft) -> None:
+def _follow(follow: etree._Element, name: str, draft: Draft, vertices: build.FreeVertices) -> None:
     """Along a path, without times."""
     holder = follow if draft.version < (1, 1) else build.sub(follow, "TrajectoryRef")
     polyline = build.sub(build.sub(holder, "Trajectory", name=name, closed="false"), "Shape/Polyline")
-    draft.vertices.add(polyline, _vertices(path, piece))
+    draft.vertices.add(polyline, vertices)
     build.sub(follow, "TimeReference/None")
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
 
 
-def _vertices(path: OffsetPath, piece: PathPiece | Bridge) -> build.FreeVertices:
+def _vertices(path: OffsetPath, piece: PathPiece | Bridge, *, keeps_heading: bool) -> build.FreeVertices:
     if isinstance(piece, Bridge):
-        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside)
-    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)))
+        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside, keeps_heading)
+    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)), keeps_heading)
 
 
 def _add_start(
@@ -238,6 +241,7 @@ class LateralAction(Struct, frozen=True):
     repeats: bool = False  # it may run more than once
     adds: bool = False  # it adds the entity
     steers: bool | None = None  # it gives the entity to a controller; False: it takes it back
+    turns: bool = False  # it may leave the entity turned against its lane: a trajectory, or what is ended half-way
 
 
 class LateralActions(Struct, frozen=True):
@@ -255,6 +259,8 @@ class LateralActions(Struct, frozen=True):
         by_entity: dict[str, dict[LateralAction, None]] = {}
         for at in scenario.storyboard.events():
             repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
+            others = (one for maneuver, one in at.group.events() if maneuver.name == at.path[3] and one is not at.event)
+            is_cut = at.act.stop_trigger is not None or any(one.priority is Priority.OVERRIDE for one in others)
             for action in at.event.actions:
                 content, path = action.content, (*at.path, action.name)
                 reference = _reference(path, len(at.event.actions) == 1, names)
@@ -262,7 +268,8 @@ class LateralActions(Struct, frozen=True):
                 for actor in (content.entity_ref,) if isinstance(content, AddEntityAction) else at.actors:
                     steers = gives(content, controls[actor]) if actor in controls else None
                     if adds or steers is not None or isinstance(content, (*LATERAL, TeleportAction)):
-                        lateral = LateralAction(path, *reference, repeats, adds, steers)
+                        turns = isinstance(content, FollowTrajectoryAction) or (is_cut and isinstance(content, LATERAL))
+                        lateral = LateralAction(path, *reference, repeats, adds, steers, turns)
                         by_entity.setdefault(actor, {})[lateral] = None
         actions = {entity: tuple(found) for entity, found in by_entity.items()}
         return cls(actions, controls, driven_from_the_start(scenario))

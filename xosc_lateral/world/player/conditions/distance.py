@@ -8,9 +8,7 @@ References
 
 from __future__ import annotations
 
-from math import copysign, hypot
-
-from msgspec.structs import replace
+from math import copysign, hypot, inf
 
 from xosc_lateral.world.player.distances import Measure, Spot, apart, free_road_gap, overlap, road_gap, spot_of
 from xosc_lateral.world.player.positions.resolve import pose_of, spot_at
@@ -21,7 +19,7 @@ from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.lanes import DRIVING, lanes_between
 from xosc_lateral.world.road.positions import difference
 from xosc_lateral.world.scenario import conditions
-from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
+from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm, Rule
 
 _SHORTEST_ROUTE_ALGORITHMS = (None, RoutingAlgorithm.UNDEFINED, RoutingAlgorithm.SHORTEST)
 
@@ -48,12 +46,12 @@ def measure_of(content: conditions.Measured | conditions.RelativeDistanceConditi
     return measure
 
 
-def _amount(measure: Measure, state: EntityState, target: Spot | EntityState) -> float:
-    """Never negative. [m]"""
+def _amount(measure: Measure, state: EntityState, target: Spot | EntityState, enough: float = inf) -> float:
+    """Never negative; exact up to `enough`. [m]"""
     if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
         place = target.plane if isinstance(target, EntityState) else target
         return apart(state, place.x, place.y)
-    return abs(measure.between(state, target))
+    return abs(measure.between(state, target, enough=enough))
 
 
 def prepare_distance(content: conditions.DistanceCondition, simulation: Simulation) -> EntityCheck:
@@ -66,8 +64,8 @@ def prepare_distance(content: conditions.DistanceCondition, simulation: Simulati
 def prepare_relative_distance(content: conditions.RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts. [m]"""
     other = simulation.entity(content.entity_ref, content.place)
-    measure = replace(measure_of(content, simulation), enough=content.value)
-    return lambda state: other.active and holds(_amount(measure, state, other), content.rule, content.value)
+    measure, value = measure_of(content, simulation), content.value
+    return lambda state: other.active and holds(_amount(measure, state, other, value), content.rule, value)
 
 
 ANGULAR_TOLERANCE = 0.05
@@ -97,12 +95,12 @@ def prepare_reach_position(content: conditions.ReachPositionCondition, simulatio
 def prepare_time_headway(content: conditions.TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when the other is behind or the entity does not move forward. [s]"""
     other = simulation.entity(content.entity_ref, content.place)
-    measure = measure_of(content, simulation)
+    measure, soon = measure_of(content, simulation), _soon(content)
 
     def check(state: EntityState) -> bool:
         if not other.active or state.speed < EPSILON:
             return False
-        distance = measure.between(state, other)
+        distance = measure.between(state, other, enough=soon * state.speed)
         return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
 
     return check
@@ -110,15 +108,24 @@ def prepare_time_headway(content: conditions.TimeHeadwayCondition, simulation: S
 
 def prepare_time_to_collision(content: conditions.TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when they don't come closer. [s]"""
-    measure, target = measure_of(content, simulation), content.target
+    measure, target, soon = measure_of(content, simulation), content.target, _soon(content)
     if isinstance(target, str):
         other = simulation.entity(target, content.place)
         simulation.derives_motion = True
-        return lambda state: (
-            other.active and _collides(measure.between(state, other), _closing_speed(state, other), content)
-        )
+
+        def check(state: EntityState) -> bool:
+            if not other.active or abs(closing := _closing_speed(state, other)) < EPSILON:
+                return False
+            return _collides(measure.between(state, other, enough=soon * abs(closing)), closing, content)
+
+        return check
     spot = spot_at(target, simulation)
     return lambda state: _collides(measure.between(state, spot()), state.speed, content)
+
+
+def _soon(content: conditions.TimeHeadwayCondition | conditions.TimeToCollisionCondition) -> float:
+    """What is later than this never fulfils a condition, ahead or behind; infinite: it may. [s]"""
+    return content.value if content.rule in (Rule.LESS_THAN, Rule.LESS_OR_EQUAL, Rule.EQUAL_TO) else inf
 
 
 def _collides(distance: float, closing: float, content: conditions.TimeToCollisionCondition) -> bool:
