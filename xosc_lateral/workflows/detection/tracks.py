@@ -121,8 +121,8 @@ class Rows:
 
     def ahead(self, row: int) -> int:
         """Row of who is next ahead in the same lane; -1: nobody."""
-        own = slice(row, row + 1)
-        return int(self._everybody.next_to(self.group[own], self.station[own], is_ahead=True)[0])
+        rows = slice(row, row + 1)
+        return int(self._everybody.next_to(self.group[rows], self.station[rows], is_ahead=True)[0])
 
     def beside(self, number: int, side: int) -> list[IntArray]:
         """Rows of the vehicles, with an ego of it alone, that are next ahead and not ahead of a track, row by row, in

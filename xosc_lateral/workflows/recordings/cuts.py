@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,20 +109,14 @@ def number_runs(state: pd.Categorical[str], lane: IntArray, vehicle: IntArray, t
     return np.where(kept, counted - 1 - (counted - begins)[start], -1)
 
 
-class Rows(NamedTuple):
-    """Whose rows they are, when and where; sorted by vehicle and time, shape (n,)."""
-
-    vehicle: IntArray
-    time: FloatArray  # [s]
-    lane: IntArray  # a number that changes with the lane
-    step: float  # between two rows, usually [s]
-
-
 def cut_table(
     columns: Mapping[str, Any],
-    rows: Rows,
     settings: CutSettings,
     *,
+    vehicle: IntArray,
+    time: FloatArray,
+    lane: IntArray,
+    step: float,
     sideways: FloatArray,
     reasons: Mapping[str, BoolArray],
     kind: NDArray[Any],
@@ -130,9 +124,9 @@ def cut_table(
 ) -> pd.DataFrame:
     """The drive table: these columns, classes of vehicles, numbers of kept stretches, and `state`.
 
+    Rows sorted by vehicle and time, usually a step apart [s], shape (n,); `lane`: a number that changes with it.
     `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
     """
-    vehicle, time, lane, step = rows
     changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
     state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
     runs = number_runs(state, lane, vehicle, time)

@@ -140,7 +140,7 @@ def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -
 def _spread(plans: Sequence[VehiclePlan]) -> Figure:
     figure = Figure(1, 2, height=130.0, legend=True)
     left, right = figure.panels
-    parts = [(plan.residuals.along, plan.residuals.across, plan.residuals.in_lane) for plan in plans]
+    parts = [(*plan.residuals.columns.values(), plan.in_lane) for plan in plans]
     along, across, in_lane = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     density, edges = np.histogram(np.clip(along, -1.0, 1.0), np.linspace(-1.0, 1.0, 81), density=True)
     left.steps(edges, density, SAMPLED)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.recordings.lateral import LateralPlan, Transition, lateral_plan
 from xosc_lateral.workflows.recordings.recorded import Recording, own_lateral
 from xosc_lateral.world.motion.nominal import EntityMotion
@@ -53,16 +54,6 @@ class SpeedProfile:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Residuals:
-    """Recorded less planned, at the recorded rows from which on the vehicle is there."""
-
-    time: FloatArray  # shape (n,) [s]
-    along: FloatArray  # along, across: ahead, and to the left, of the planned place, shape (n,) [m]
-    across: FloatArray
-    in_lane: NDArray[np.bool_]  # outside of all transitions: what is across is the driver's, shape (n,)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class VehiclePlan:
     """One vehicle's part in the scenario."""
 
@@ -81,7 +72,7 @@ class VehiclePlan:
     direction: int
     offset: float
     targets: tuple[int, ...]  # OpenDRIVE lane that each transition leads to
-    residuals: Residuals
+    residuals: Track  # recorded less planned, from where it is there: `along`, ahead, and `across`, to the left [m]
 
     @property
     def present(self) -> tuple[float, float]:
@@ -91,6 +82,15 @@ class VehiclePlan:
     def time_at(self, way: FloatArray) -> FloatArray:
         """When the recorded vehicle was as far, shape as the argument. [s]"""
         return np.interp(way, np.maximum.accumulate(self.way), self.vehicle.time)
+
+    @property
+    def in_lane(self) -> NDArray[np.bool_]:
+        """Rows of the residuals outside of all transitions: what is across is the driver's."""
+        time = self.residuals.time
+        within = np.zeros(len(time), dtype=np.bool_)
+        for transition in self.lateral.transitions:
+            within |= (time >= transition.start) & (time <= transition.end)
+        return ~within
 
     @property
     def changes(self) -> tuple[Transition, ...]:
@@ -148,11 +148,8 @@ def _plan(name: str, vehicle: EntityMotion, network: RoadNetwork, length: float,
     speed = SpeedProfile(np.r_[begin, speed.time[later]], speeds, ahead)
     present = time >= begin - 1e-9
     moments = time[present]
-    aside = y[present] - lateral.at(moments)
-    in_lane = np.ones(len(moments), dtype=np.bool_)
-    for transition in lateral.transitions:
-        in_lane &= (moments < transition.start) | (moments > transition.end)
-    residuals = Residuals(moments, way[present] - speed.way(moments), aside, in_lane)
+    away = {"along": way[present] - speed.way(moments), "across": y[present] - lateral.at(moments)}
+    residuals = Track(name, moments, away, np.empty(0, dtype=np.intp))
     return VehiclePlan(name, vehicle, lateral, way, speed, appears, leaves, *start, targets, residuals)
 
 

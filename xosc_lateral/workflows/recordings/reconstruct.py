@@ -183,12 +183,12 @@ def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, Flo
     """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
     residuals = plan.residuals
     time, width = residuals.time, plan.vehicle.lane_width[-len(residuals.time) :]
-    following = residuals.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
+    following = plan.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
     parts = []
     for part in true_slices(following):
         even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
         if len(even) * STEP > WINDOW:
-            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.across, width))
+            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.columns["across"], width))
             parts.append((even, across, wide))
     return parts
 

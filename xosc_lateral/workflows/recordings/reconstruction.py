@@ -161,7 +161,7 @@ def rows_of(made: Reconstruction) -> dict[str, int]:
 
 def summary(plans: Sequence[VehiclePlan], duration: float) -> dict[str, float]:
     """Counts, and residuals of all vehicles together. [m], [s]"""
-    parts = [(plan.residuals.along, plan.residuals.across, plan.residuals.in_lane) for plan in plans]
+    parts = [(*plan.residuals.columns.values(), plan.in_lane) for plan in plans]
     along, across, in_lane = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     driven = sum(float(plan.speed.time[-1] - plan.speed.time[0]) for plan in plans)
     corners = sum(len(plan.speed.time) - 2 for plan in plans)
@@ -194,15 +194,15 @@ def vehicle_rows(plans: Sequence[VehiclePlan], drivers: Sequence[ChosenDriver]) 
             "to": round(plan.present[1], 3),
             "corners": len(plan.speed.time) - 2,
             "lane_changes": len(plan.changes),
-            "along_rms": round(_rms(residuals.along), 4),
-            "along_largest": round(float(np.abs(residuals.along).max(initial=0.0)), 4),
-            "across_in_lane_rms": round(_rms(residuals.across[residuals.in_lane]), 4),
-            "across_in_maneuvers_rms": round(_rms(residuals.across[~residuals.in_lane]), 4),
+            "along_rms": round(_rms(along), 4),
+            "along_largest": round(float(np.abs(along).max(initial=0.0)), 4),
+            "across_in_lane_rms": round(_rms(across[in_lane]), 4),
+            "across_in_maneuvers_rms": round(_rms(across[~in_lane]), 4),
             "profile": driver.profile,
             "why": driver.why,
         }
         for plan, driver in zip(plans, drivers, strict=True)
-        for residuals in [plan.residuals]
+        for along, across, in_lane in [(*plan.residuals.columns.values(), plan.in_lane)]
     ]
 
 
@@ -255,7 +255,7 @@ def not_expressed(plans: Sequence[VehiclePlan], left_out: Sequence[str]) -> list
         if cut := sum(transition.cut for transition in plan.lateral.transitions):
             lines.append(f"{plan.name}: {cut} lateral maneuvers begin or end outside of the recording")
         for word, name in (("along the road", "along"), ("beside its maneuvers", "across")):
-            away = np.abs(getattr(plan.residuals, name))
+            away = np.abs(plan.residuals.columns[name])
             if away.max(initial=0.0) > NAMED_RESIDUAL:
                 time = plan.residuals.time[int(away.argmax())]
                 lines.append(f"{plan.name}: up to {away.max():.2f} m {word}, at {time:.1f} s")

@@ -34,7 +34,7 @@ from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.mapping import classes_of
 from xosc_lateral.files.tables import read_table
-from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, Rows, cut_table, require_lane_direction
+from xosc_lateral.workflows.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
 from xosc_lateral.workflows.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.workflows.recordings.lane_graph import NEIGHBOUR_DISTANCE, find_neighbours
 
@@ -175,8 +175,10 @@ def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
         "lane_count": count.astype(np.int64),
         **near,
     }
-    rows, reasons = Rows(tracks["vehicle"].to_numpy(), frame * step, lane_number, step), {"no lane": lane_number < 0}
-    return cut_table(columns, rows, settings, sideways=left, reasons=reasons, kind=kind, is_truck=is_truck)
+    return cut_table(
+        columns, settings, vehicle=tracks["vehicle"].to_numpy(), time=frame * step, lane=lane_number, step=step,
+        sideways=left, reasons={"no lane": lane_number < 0}, kind=kind, is_truck=is_truck,
+    )  # fmt: skip
 
 
 def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
@@ -203,11 +205,10 @@ def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
         "acceleration": tracks["lonAcceleration"].to_numpy(),
         **_exid_neighbours(tracks, is_truck),
     }
-    rows, reasons = (
-        Rows(vehicle, frame * step, lane, step),
-        {"no vehicle": ~np.isin(kind, list(DRIVEN)), "no lane": ~known},
-    )
-    return cut_table(columns, rows, settings, sideways=lateral, reasons=reasons, kind=kind, is_truck=is_truck)
+    return cut_table(
+        columns, settings, vehicle=vehicle, time=frame * step, lane=lane, step=step, sideways=lateral,
+        reasons={"no vehicle": ~np.isin(kind, list(DRIVEN)), "no lane": ~known}, kind=kind, is_truck=is_truck,
+    )  # fmt: skip
 
 
 def _first(column: pd.Series) -> FloatArray:

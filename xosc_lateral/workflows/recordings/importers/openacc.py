@@ -32,6 +32,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.files.source import open_source
@@ -76,7 +77,7 @@ def import_openacc(
         raise NotEnoughDataError(f"{paths[0]}: no car moves")
     frames = []
     for side in (1.0, -1.0):  # counter-clockwise, clockwise: two lanes
-        if same := [car for car in cars if car.turn == side]:
+        if same := [car for car in cars if _turn(car) == side]:
             frames += _placed(same, _centre_line(same), lane_width)
     table = pd.concat(frames, ignore_index=True)
     note = "lane centre: mean path of all passes; lane width assumed; steering by hand assumed throughout"
@@ -86,30 +87,18 @@ def import_openacc(
     return imported(table, sources=paths, step=step, **about)
 
 
-@dataclass(frozen=True, eq=False)
-class _Car:
-    """One car in one file, arrays of shape (n,); `lead`: gap to the car ahead, NaN: there is none. [m]"""
-
-    name: str
-    time: FloatArray
-    x: FloatArray
-    y: FloatArray
-    speed: FloatArray
-    lead: FloatArray
-
-    @property
-    def moves(self) -> BoolArray:
-        """Rows that say something about the lane, shape (n,)."""
-        return np.asarray(self.speed > MINIMUM_SPEED)
-
-    @property
-    def turn(self) -> float:
-        """1 for a loop driven counter-clockwise, else -1."""
-        area = float(np.sum(self.x[:-1] * np.diff(self.y) - self.y[:-1] * np.diff(self.x)))
-        return 1.0 if area >= 0.0 else -1.0
+def _moves(car: Track) -> BoolArray:
+    """Rows that say something about the lane, shape (n,)."""
+    return np.asarray(car.speed > MINIMUM_SPEED)
 
 
-def _cars(path: Path, dropped: Counter[str], notes: list[str]) -> list[_Car]:
+def _turn(car: Track) -> float:
+    """1 for a loop driven counter-clockwise, else -1."""
+    area = float(np.sum(car.x[:-1] * np.diff(car.y) - car.y[:-1] * np.diff(car.x)))
+    return 1.0 if area >= 0.0 else -1.0
+
+
+def _cars(path: Path, dropped: Counter[str], notes: list[str]) -> list[Track]:
     """Those that move; `dropped`, `notes`: of the others' rows, and of what is no car's."""
     with open_source(path) as opened:
         lines = unpacked_text(opened).read().decode("utf-8", "replace").splitlines(keepends=True)
@@ -140,10 +129,9 @@ def _cars(path: Path, dropped: Counter[str], notes: list[str]) -> list[_Car]:
         dropped.update({"no place": len(frame) - len(time), **known.dropped})
         notes += known.notes
         parts = (known.rows[known.vehicle == number] for number in range(len(known.names)))
-        cars += [
-            _Car(called, time[part], *(column[part] for column in columns))
-            for called, part in zip(known.names, parts, strict=True)
-        ]
+        for called, part in zip(known.names, parts, strict=True):
+            driven = {key: column[part] for key, column in zip(("x", "y", "speed", "lead"), columns, strict=True)}
+            cars.append(Track(called, time[part], driven, np.empty(0, dtype=np.intp)))
     return cars
 
 
@@ -202,9 +190,9 @@ def _between_points(index: FloatArray, columns: Sequence[FloatArray]) -> list[Fl
     return values
 
 
-def _centre_line(cars: Sequence[_Car]) -> _Loop:
+def _centre_line(cars: Sequence[Track]) -> _Loop:
     loop = _even(_smooth(_first_lap(cars)))
-    x, y = (np.concatenate([getattr(car, name)[car.moves] for car in cars]) for name in ("x", "y"))
+    x, y = (np.concatenate([car.columns[name][_moves(car)] for car in cars]) for name in ("x", "y"))
     for _ in range(ROUNDS):
         index, offset = loop.place(x, y)
         near = np.abs(offset) < LANE_SHARE * LANE_WIDTH
@@ -216,10 +204,10 @@ def _centre_line(cars: Sequence[_Car]) -> _Loop:
     return loop
 
 
-def _first_lap(cars: Sequence[_Car]) -> FloatArray:
+def _first_lap(cars: Sequence[Track]) -> FloatArray:
     """The first closed lap of the car that goes furthest, shape (n, 2), points `GRID_STEP` apart, its ends met. [m]"""
     car = max(cars, key=lambda car: float(np.hypot(np.diff(car.x), np.diff(car.y)).sum()))
-    path = np.stack([car.x, car.y], axis=1)[car.moves]
+    path = np.stack([car.x, car.y], axis=1)[_moves(car)]
     way = _way(path)
     for begin in range(0, len(path), max(1, len(path) // 100)):  # the very first metres may lie beside the loop
         back = np.hypot(*(path - path[begin]).T)
@@ -267,7 +255,7 @@ def standing_speed(time: FloatArray, speed: FloatArray) -> BoolArray:
     return frozen
 
 
-def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.DataFrame]:
+def _placed(cars: Sequence[Track], loop: _Loop, lane_width: float) -> list[pd.DataFrame]:
     bends = _smooth(loop.curvature())
     frames = []
     for car in cars:
@@ -282,7 +270,7 @@ def _placed(cars: Sequence[_Car], loop: _Loop, lane_width: float) -> list[pd.Dat
             "lane_width": lane_width,
             "speed": car.speed.round(4),
             "curvature": bends[np.floor(index).astype(np.int64) % len(bends)].round(7),
-            "lead_distance": np.where(car.lead > 0.0, car.lead, np.nan).round(3),
+            "lead_distance": np.where(car.columns["lead"] > 0.0, car.columns["lead"], np.nan).round(3),
             VALID_BELOW: HIGHEST_FREQUENCY,
             RESOLUTION: POSITION_RESOLUTION,
             RUN: np.cumsum(new),

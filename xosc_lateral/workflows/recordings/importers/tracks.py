@@ -30,7 +30,6 @@ from xosc_lateral.workflows.recordings.cuts import (
     LANE_AGREEMENT,
     MOVING_SPEED,
     CutSettings,
-    Rows,
     cut_table,
     require_lane_direction,
 )
@@ -158,10 +157,12 @@ def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
         **near,
     }
     against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
-    rows = Rows(tracks.vehicle, tracks.time, lane, tracks.step)
     reasons = {"no vehicle": ~np.isin(tracks.kind, ["", *DRIVEN]), "no lane": ~inside}
     reasons |= {"against the lane": against & inside} if against.any() else {}
-    return cut_table(columns, rows, settings, sideways=sideways, reasons=reasons, kind=tracks.kind, is_truck=is_truck)
+    return cut_table(
+        columns, settings, vehicle=tracks.vehicle, time=tracks.time, lane=lane, step=tracks.step, sideways=sideways,
+        reasons=reasons, kind=tracks.kind, is_truck=is_truck,
+    )  # fmt: skip
 
 
 # ---- lanes between two lines each ------------------------------------------------------------------------------------
