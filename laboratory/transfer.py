@@ -280,7 +280,7 @@ def lines_of(rows: Sequence[dict[str, Any]], goal: str) -> str:
 
 
 def run_lines(rows: Sequence[dict[str, Any]]) -> str:
-    """False alarms an hour on runs without cut-ins at `GOALS[0]`: means, and the least and most of a run."""
+    """False alarms an hour on runs without cut-ins at `GOALS[0]`: means, and the least and most of a run's means."""
 
     def cell(each: Sequence[dict[str, Any]]) -> str:
         runs = np.mean([row["runs"] for row in each], axis=0)
@@ -304,7 +304,10 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def _table(found: Sequence[dict[str, Any]], cell: Callable[[Sequence[dict[str, Any]]], str]) -> str:
-    homes, names = (list(dict.fromkeys(row[key] for row in found)) for key in ("home", "detector"))
+    homes = list(dict.fromkeys(row["home"] for row in found))
+    names = [
+        name for name in (*(rule.title() for rule in RULES), *LEARNERS) if any(row["detector"] == name for row in found)
+    ]
     lines = ["| detector | " + " | ".join(f"set up on {home}" for home in homes) + " |"]
     lines.append("|---" * (1 + len(homes)) + "|")
     for name in names:
@@ -336,7 +339,7 @@ def main() -> None:
     for goal, marker in (("20/h", "rate"), ("95%", "share"), ("p = 0.5", "half")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
     show(told_lines(rows), args.write, "transfer-told")
-    if runs:
+    if any(row.get("runs") for row in rows):
         show(run_lines(rows), args.write, "transfer-runs")
 
 

@@ -38,7 +38,7 @@ VERBS = {
     "profiles": "The library of driver profiles.",
     "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
-    "vary": "A scenario's lane changes as real drivers take them.",
+    "vary": "A scenario's lane changes as long as real ones.",
     "live": "Drivers in a simulation that runs.",
     "export": "Drivers as parts for other tools.",
 }

@@ -187,5 +187,10 @@ def vary(
     options: Annotated[Options, xl.vary],
     reply: Written,
 ) -> None:
-    """Write variations of a scenario in which lane changes last as long as those of a profile's drivers."""
+    """Write variations of a scenario in which lane changes last as long as those of a profile's drivers.
+
+    Drawn are durations, from lane changes to that side at about its speed, in such a lane, as far behind the vehicle
+    ahead; with --speeds, changes of speed. Who changes lanes, when and where to stays the scenario's: neither gaps nor
+    rates are drawn, nor lane changes that are given up.
+    """
     reply.say(xl.vary(scenario, output, **options, force=reply.force))

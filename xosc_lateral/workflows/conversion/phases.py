@@ -111,19 +111,19 @@ class _Phases:
 
     def _find_across(self) -> None:
         """Paths in place of lane changes; lines on those that stay as written."""
-        motion, found = self._entity.motion, set[Path]()
+        motion = self._entity.motion
         runs = movement_runs(self._plan.extended.motion, motion, self._network, self._entity.spans)
         for crossing in crossings(self._plan.extended.motion, motion, runs):
-            found.add(crossing.path)
             if why := crossing.stays or self._kept_for(crossing):
                 what = f"{'lane change' if crossing.is_lane_change else 'lane offset'} of '{motion.name}'"
                 self.stays.append(f"{what} at {motion.time[crossing.first]:.1f} s stays as written: {why}")
             else:
                 self._crossed[crossing.path] = self._driven_at(sum(bell_time(motion, crossing)))
                 self.across[crossing.path] = self._across(crossing)
-        for path in lane_changes_of(self._plan.played.scenario, motion.name).keys() - found:
+        written = lane_changes_of(self._plan.played.scenario, motion.name)
+        for path in sorted(written.keys() - {one.path for one in self._own}):
             what = f"lane change '{path[-1]}' of '{motion.name}'"
-            self.stays.append(f"{what} stays as written: it is none in the nominal run, or not a driver's")
+            self.stays.append(f"{what} stays as written: the nominal run does not come to it")
 
     def _kept_for(self, crossing: Crossing) -> str:
         """Why the player has to take it as written; empty: a path can lead across."""
@@ -143,7 +143,7 @@ class _Phases:
         known = crossing.path not in self._plan.depends.begins
         offset = self._foreseeing if known else self._offset
         first, last = float(self._driven[crossing.first]), self._crossed[crossing.path]
-        lead_in = float(bell_share(np.array((motion.time[crossing.first] - begin) / duration)))
+        lead_in = float(bell_share(np.clip((motion.time[crossing.first] - begin) / duration, 0.0, 1.0)))
 
         def way(distance: FloatArray) -> FloatArray:
             time = np.interp(distance, self._driven, motion.time)

@@ -19,7 +19,7 @@ from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
 from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
-from xosc_lateral.world.scenario.private_actions import LONGITUDINAL
+from xosc_lateral.world.scenario.private_actions import LONGITUDINAL, LaneChangeAction
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
@@ -175,7 +175,6 @@ def _add_speed_change(
 def _lane_changes(draft: Draft, played: Played) -> list[tuple[PlayedAction, etree._Element]]:
     """The scenario's own that last for a time, in order of their begin, with the elements that say how long."""
     from xosc_lateral.files.openscenario.write.draft import source_of
-    from xosc_lateral.world.scenario.private_actions import LaneChangeAction
 
     changes = []
     for action in sorted(played.motion.actions, key=lambda action: (action.start, action.path)):
