@@ -45,8 +45,8 @@ RUN = (
     "pipeline.md",
     "api.md",
 )
-FOR_PAGES = {"tutorials/researcher.md": pytest.mark.pages}
-"""Run by `make pages` alone: it closes a loop, as README's walk does; here its commands are begun."""
+FOR_PAGES = {"tutorials/researcher.md": pytest.mark.pages, "how_to/derive_a_driver.md": pytest.mark.pages}
+"""Run by `make pages`, begun here: README's walk closes a loop, the help's examples derive."""
 RECORDING, SIMULATOR, HOUR = "a recording that is not shipped", "another program", "an hour of work"
 EXCERPT = "an excerpt or a drawing: nothing to run"
 NOT_RUN = {

@@ -6,9 +6,10 @@ files by their paths is right about these, too.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from weakref import WeakValueDictionary
 
@@ -49,13 +50,23 @@ def held_bytes(path: Path) -> bytes | None:
 
 def is_file(path: Path) -> bool:
     """Whether there is a file, in memory or on a disk."""
-    return held_bytes(path) is not None or path.is_file()
+    return held_bytes(path) is not None or _on_disk(Path.is_file, path)
+
+
+def _on_disk(asked: Callable[[Path], bool], path: Path) -> bool:
+    """What a disk says; no file has a name that is too long for one."""
+    try:
+        return asked(path)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        return False
 
 
 def exists(path: Path) -> bool:
     """Whether there is a file or folder, in memory or on a disk."""
     held = held_at(path)
-    return path.exists() if held is None else any(path in (file, *file.parents) for file in held.files)
+    return _on_disk(Path.exists, path) if held is None else any(path in (file, *file.parents) for file in held.files)
 
 
 def glob(folder: Path, pattern: str) -> Iterator[Path]:

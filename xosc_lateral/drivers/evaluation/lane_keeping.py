@@ -208,7 +208,7 @@ def lane_keeping(
     half_width = HALF_WIDTH if half_width is None else half_width
     within = drives - drives.mean(axis=1, keepdims=True)
     limit = 0.5 * lane_width - half_width - NEAR_LINE
-    crossing = time_to_line_crossing(drives, np.full_like(drives, lane_width), step, half_width=half_width)
+    crossing = time_to_line_crossing(drives, np.broadcast_to(lane_width, drives.shape), step, half_width=half_width)
 
     def by_drive(rows: int) -> dict[str, FloatArray]:
         return {

@@ -20,7 +20,7 @@ from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.linear_filters import prepare
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.drivers.model.sampling import responses_to, sample_offsets
 from xosc_lateral.drivers.model.seeds import child
 
 # Columns of `snippet_metrics`, in the order of arXiv:2405.17080, section IV.
@@ -87,9 +87,10 @@ def free_runs(
 ) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
     segment = Segment.even(duration, profile.model.step, profile.lane_width, speed)
-    root = np.random.SeedSequence(seed)
+    root, responses = np.random.SeedSequence(seed), responses_to(segment, profile)
     prepare(drivers * len(segment))
-    return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drivers)])
+    seeds = (child(root, k) for k in range(drivers))
+    return np.array([sample_offsets(profile, segment, one, responses=responses) for one in seeds])
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,12 @@ def responses_to(segment: Segment, profile: DriverProfile) -> Responses:
 
 
 def sample_offsets(
-    profile: DriverProfile, segment: Segment, seed: int | np.random.SeedSequence, *, start: float | None = None
+    profile: DriverProfile,
+    segment: Segment,
+    seed: int | np.random.SeedSequence,
+    *,
+    start: float | None = None,
+    responses: Responses | None = None,
 ) -> FloatArray:
     """Offsets [m] of one drive of a single segment, shape (n,); see `OffsetSampler.sample`.
 
@@ -123,7 +128,7 @@ def sample_offsets(
     sampler, inside = OffsetSampler(profile, seed), segment.inside
     time, speed = segment.time[inside], np.nan_to_num(segment.speed[inside], nan=MINIMUM_SPEED)
     if len(time) < 2 or not is_slow(speed).any():
-        return sampler.sample(segment, start=start)
+        return sampler.sample(segment, start=start, responses=responses)
     step = float(time[1] - time[0])
     own_times, _, rows = ticks_of(time, speed, step)
     samples = sampler.sample(segment.at(np.append(rows, rows[-1])), start=start)
