@@ -36,8 +36,8 @@ def show(
     profile: Name, *, options: Annotated[Options, xl.read_profile], report: Page = None, reply: Written,
 ) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
+    from xosc_lateral.workflows.conversion.driver_context import NEIGHBOURS
     from xosc_lateral.workflows.conversion.proof import proofs_of
-    from xosc_lateral.workflows.conversion.seen import NEIGHBOURS
     from xosc_lateral.workflows.profiles.cards import card, card_text
 
     driver = xl.read_profile(profile, **options)

@@ -13,8 +13,8 @@ from tests.kit.profiles import simulated_profile
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.conversion.driver_context import mirrored
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
-from xosc_lateral.workflows.conversion.seen import mirrored
 from xosc_lateral.world.scenario.enums import VehicleCategory
 
 ROADS = [("RHT", -1), ("RHT", 1), ("LHT", 1), ("LHT", -1)]

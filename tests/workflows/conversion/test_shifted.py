@@ -10,8 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
+from xosc_lateral.workflows.conversion.event_equivalence import shrink_until_equivalent
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.meaning import keep_meaning
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, PathPiece, resized
@@ -69,7 +69,7 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
         large = [one for one in some if one.entity == "A" and one.after is None and _largest(one) > 0.034]
         return None, [change if large else Comparison((), ())]
 
-    _, kept = keep_meaning(paths, _nobody(), attempt)
+    _, kept = shrink_until_equivalent(paths, _nobody(), attempt)
     assert kept.changes == ()
     assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (0.25, False)}
@@ -79,7 +79,7 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     paths = [_path("A", None), _path("B", None)]
-    _, kept = keep_meaning(paths, _nobody(), lambda *_: (None, [change]))
+    _, kept = shrink_until_equivalent(paths, _nobody(), lambda *_: (None, [change]))
     assert kept.paths == tuple(paths) and kept.smaller == {}
     assert kept.changes == change.changes
 
@@ -100,7 +100,7 @@ def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
         change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
         return None, [Comparison((), (change,) if len(tried) < 60 else ())]
 
-    keep_meaning(paths, _nobody(), attempt)
+    shrink_until_equivalent(paths, _nobody(), attempt)
     assert len({path.start for path in tried}) > 4
     for path in tried:
         sampled = places["AB".index(path.entity)]

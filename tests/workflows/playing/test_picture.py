@@ -14,7 +14,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.files import source
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.workflows.conversion.page import key_figures
-from xosc_lateral.workflows.playing.picture import GIF_STEP, REACH, Scene
+from xosc_lateral.workflows.playing.picture import GIF_STEP, REACH, PictureScene
 from xosc_lateral.workflows.playing.scene import scene_of
 
 TIME = 4.0
@@ -26,8 +26,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> xl.Conversion:
     return xl.convert(scenario, ego="none", seed=1, time_limit=12.0)
 
 
-def shown(made: xl.Conversion) -> Scene:
-    return Scene(scene_of(made.movement.motion, made.movement.network, made.movement.entities))
+def shown(made: xl.Conversion) -> PictureScene:
+    return PictureScene(scene_of(made.movement.motion, made.movement.network, made.movement.entities))
 
 
 def test_vehicles_are_as_far_apart_as_the_table_says(made):

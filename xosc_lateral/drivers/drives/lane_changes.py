@@ -131,7 +131,7 @@ class Course:
             rough.append(self._change(last - 1, last, len(lanes) - 1, cut=True))
         else:
             rough += self._open(slice(settled[-1].start, len(lanes)), -1)
-        return _apart(sorted(rough, key=lambda part: part.first))
+        return _without_overlaps(sorted(rough, key=lambda part: part.first))
 
     def _is_settled(self, part: slice, *, is_passing: bool) -> bool:
         """Near the lane's centre, and not just crossing it: between two crossings to one side, speed falls by half."""
@@ -198,7 +198,7 @@ class Course:
         ]
 
 
-def _apart(rough: list[Rough]) -> list[Rough]:
+def _without_overlaps(rough: list[Rough]) -> list[Rough]:
     """Without movement within a lane that is part of a lane change; both halves of an aborted one, or none."""
     changes = [(movement.first, movement.last) for movement in rough if movement.lanes]
     inside = [any(first < movement.last and movement.first < last for first, last in changes) for movement in rough]

@@ -26,8 +26,8 @@ from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.meaning import as_played, keep_meaning
-from xosc_lateral.workflows.conversion.plan import Plan, decide, heeds_controllers, other_egos
+from xosc_lateral.workflows.conversion.event_equivalence import as_played, shrink_until_equivalent
+from xosc_lateral.workflows.conversion.plan import Plan, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
@@ -166,10 +166,10 @@ def sample(plan: Plan) -> Enriched:
     try:
         run = plan.prepared.segmented(
             plan.extended,  # played on beyond the end where the output is reactive, and the same up to there
-            uncertain=plan.depends.entities,
+            ego_dependent=plan.depends.entities,
             continuous=plan.continuous,
             neighbours=settings.neighbours,
-            heeds_controllers=heeds_controllers(settings),
+            respects_controllers=respects_controllers(settings),
         )
         return enrich(
             run,
@@ -181,21 +181,21 @@ def sample(plan: Plan) -> Enriched:
             attempts=settings.attempts,
             with_sensor=settings.with_sensor,
             lane_changes=settings.lane_changes,
-            least_time=0.0 if plan.is_replay else plan.prepared.meaning(tuple(plan.egos)).longest_time,
+            least_time=0.0 if plan.is_replay else plan.prepared.equivalence(tuple(plan.egos)).longest_time,
         )
     except DriverProfileError as error:  # sampling does not know the file
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
 def check(plan: Plan, written: Written) -> Written:
-    """Play a reactive output under `Meaning`'s ways of driving, and make moves smaller where they change events.
+    """Play a reactive output in `EventEquivalence`'s ways of driving, and make moves smaller where they change events.
 
     A replay follows the clock: nothing can happen otherwise.
     """
     if plan.is_replay:
         return written
     settings, source = plan.settings, plan.played.scenario
-    source_meaning = plan.prepared.meaning(tuple(plan.egos))
+    equivalence = plan.prepared.equivalence(tuple(plan.egos))
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
     allowed = (*settings.allow, *(path.parent for path in read_files))
 
@@ -208,19 +208,19 @@ def check(plan: Plan, written: Written) -> Written:
         # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
         place = leads_from(plan.source, plan.output)
         output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = source_meaning.compare(
+        comparisons, run = equivalence.compare(
             output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
         )
         return (trial, output, run), comparisons
 
-    (best, output, run), kept = keep_meaning(written.paths, plan.played.motion, attempt)
+    (best, output, run), kept = shrink_until_equivalent(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
     warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
     if settings.player_library is not None:
         warned += told_by_player(
-            settings.player_library, plan.source, (plan.output, best.file.data or b""), source_meaning.runs,
+            settings.player_library, plan.source, (plan.output, best.file.data or b""), equivalence.runs,
             plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip

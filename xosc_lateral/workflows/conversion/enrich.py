@@ -19,6 +19,14 @@ from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_erro
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.drivers.model.seeds import of_driver
 from xosc_lateral.workflows.conversion.consequences import lane_departures
+from xosc_lateral.workflows.conversion.driver_context import (
+    NOTHING_SEEN,
+    SAMPLE_STEP,
+    Contexts,
+    DriverContext,
+    going_on,
+    seen_by,
+)
 from xosc_lateral.workflows.conversion.result import (
     Drivers,
     Enriched,
@@ -26,9 +34,8 @@ from xosc_lateral.workflows.conversion.result import (
     LaneChanges,
     Neighbours,
     SampledSegment,
-    untouched,
+    nominal_result,
 )
-from xosc_lateral.workflows.conversion.seen import NOTHING_SEEN, SAMPLE_STEP, Contexts, Seen, going_on, seen_by
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import (
@@ -95,7 +102,7 @@ def enrich(
     for attempt in range(max(1, attempts)):
         drawn = [drawn_for(index, attempt) for index in range(len(motion.entities))]
         if run.neighbours is Neighbours.BORROW:
-            drawn = _apart(drawn, motion, network, run.uncertain)
+            drawn = _give_way(drawn, motion, network, run.ego_dependent)
         entities = _with_trailers([_result(one, network) for one in drawn], network, run.trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
         departures = tuple(departure for entity in entities for departure in lane_departures(entity, network))
@@ -141,7 +148,7 @@ class _Drawn:
     motion: EntityMotion
     spans: tuple[SegmentSpan, ...]
     profile: DriverProfile | None = None
-    seen: Seen = NOTHING_SEEN  # without its segments once they are sampled: they are large
+    seen: DriverContext = NOTHING_SEEN  # without its segments once they are sampled: they are large
     crossings: tuple[Crossing, ...] = ()
     lifelike: bool = False  # where they can be
     samples: tuple[_Sample, ...] = ()
@@ -182,12 +189,12 @@ class SegmentedRun:
     """A played scenario cut into segments, and what its drivers see: the same for all variants.
 
     - `trailers`: entity that is pulled -> its tractor, in whose track it follows
-    - `uncertain`: entities that will move otherwise, since they depend on a vehicle under test or a controller: nobody
-      responds to where they nominally are, nor do they to others
+    - `ego_dependent`: entities that will move otherwise, since they depend on a vehicle under test or a controller:
+      nobody responds to where they nominally are, nor do they to others
     - `continuous`: whose movement goes on through lane changes and lane offsets (`movement_runs`); that of the others
       leads from the segment before to the one behind
     - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
-    - `heeds_controllers`: where a controller of the player steers, nothing is sampled
+    - `respects_controllers`: where a controller of the player steers, nothing is sampled
     """
 
     def __init__(
@@ -196,15 +203,17 @@ class SegmentedRun:
         network: RoadNetwork,
         *,
         trailers: Mapping[str, str] | None = None,
-        uncertain: Collection[str] = (),
+        ego_dependent: Collection[str] = (),
         continuous: Collection[str] = (),
         neighbours: Neighbours = Neighbours.BORROW,
-        heeds_controllers: bool = True,
+        respects_controllers: bool = True,
     ) -> None:
         self.motion, self.network, self.neighbours = motion, network, neighbours
-        self.trailers, self.uncertain = trailers or {}, frozenset(uncertain)
+        self.trailers, self.ego_dependent = trailers or {}, frozenset(ego_dependent)
         self.spans = [
-            cut_segments(entity, network, is_trailer=entity.name in self.trailers, heeds_controllers=heeds_controllers)
+            cut_segments(
+                entity, network, is_trailer=entity.name in self.trailers, respects_controllers=respects_controllers
+            )
             for entity in motion.entities
         ]
         self.runs = [
@@ -219,16 +228,16 @@ class SegmentedRun:
         ]
         """Lane changes and lane offsets in them."""
         self.gaps = gaps_of(motion, motion.entities)
-        certain = tuple(one for one in motion.entities if one.name not in self.uncertain)
+        certain = tuple(one for one in motion.entities if one.name not in self.ego_dependent)
         self._certain = Surroundings(replace(motion, entities=certain), network)
-        self._seen: dict[int, tuple[DriverProfile, Seen]] = {}
+        self._seen: dict[int, tuple[DriverProfile, DriverContext]] = {}
 
-    def seen(self, index: int, driver: DriverProfile, contexts: Contexts) -> Seen:
+    def seen(self, index: int, driver: DriverProfile, contexts: Contexts) -> DriverContext:
         """What the driver of an entity sees; looked at once for all variants with the same one."""
         before, seen = self._seen.get(index, (None, NOTHING_SEEN))
         if before is not driver or contexts:
             entity, around = self.motion.entities[index], self._certain
-            if entity.name in self.uncertain:
+            if entity.name in self.ego_dependent:
                 around = Surroundings(replace(self.motion, entities=(entity,)), self.network)
             seen = seen_by(driver, entity, around, self.runs[index], contexts, self.neighbours)
             if not contexts and self.is_small:
@@ -280,11 +289,11 @@ def _anticipated(
     return offset
 
 
-def _apart(
-    drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork, uncertain: Collection[str]
+def _give_way(
+    drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork, ego_dependent: Collection[str]
 ) -> list[_Drawn]:
     """Neighbours give way to each other, where it is certain that they meet."""
-    certain = [one for one in drawn if one.motion.name not in uncertain]
+    certain = [one for one in drawn if one.motion.name not in ego_dependent]
     if len(certain) < 2 or not any(one.samples for one in certain):
         return list(drawn)
     rows = np.arange(0, len(motion.entities[0].time), max(1, round(SAMPLE_STEP / motion.step)))
@@ -307,14 +316,14 @@ def _sampled(vehicle: _Drawn, rows: IntArray) -> SampledVehicle:
             for span in sample.spans:
                 can_move[(rows >= span.first) & (rows <= span.last)] = span.is_road_following
     seen = vehicle.seen
-    return SampledVehicle(vehicle.motion, deviation, can_move, seen.responds, seen.alone)
+    return SampledVehicle(vehicle.motion, deviation, can_move, seen.responds, seen.answer_known)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     """Paths through the offsets, smoothed where nobody could drive them."""
     entity = drawn.motion
     if not drawn.samples:
-        return untouched(entity, drawn.spans, drawn.why)
+        return nominal_result(entity, drawn.spans, drawn.why)
     driven = [drivable(one.offset, SAMPLE_STEP, entity.speed[one.knots]) for one in drawn.samples]
     samples = tuple(
         one._replace(offset=offset + one.error) for one, (offset, _) in zip(drawn.samples, driven, strict=True)

@@ -55,10 +55,10 @@ def moving_share(entity: EntityMotion) -> float | None:
 def _led_across(run: NominalMotion, entity: EntityMotion) -> BoolArray:
     """Rows in which an action of the source leads it along a path: to another lane."""
     rows = np.zeros(len(entity.time), dtype=np.bool_)
-    for one in run.actions:
-        is_path = isinstance(one.action.content, FollowTrajectoryAction) and not one.path[0].startswith(STORY_PREFIX)
-        if one.actor == entity.name and is_path:
-            rows |= (entity.time >= one.start) & (entity.time <= (np.inf if one.end is None else one.end))
+    for played in run.actions:
+        is_own = not played.path[0].startswith(STORY_PREFIX)
+        if played.actor == entity.name and is_own and isinstance(played.action.content, FollowTrajectoryAction):
+            rows |= (entity.time >= played.start) & (entity.time <= (np.inf if played.end is None else played.end))
     return rows
 
 

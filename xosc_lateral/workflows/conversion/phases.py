@@ -97,7 +97,7 @@ class _Phases:
         self._own = [one for one in plan.extended.motion.actions if one.actor == entity.name]
         self._lateral = {one.path for one in plan.lateral.by_entity.get(entity.name, ())}
         self._driven = distance_driven(motion)
-        reach = plan.prepared.meaning(tuple(plan.egos)).farthest(entity.name)
+        reach = plan.prepared.equivalence(tuple(plan.egos)).farthest(entity.name)
         has_route = any(isinstance(one.action.content, AssignRouteAction | AcquirePositionAction) for one in self._own)
         self._way = way_of(motion, self._network, reach, has_route=has_route)
         self._offset = deviation_through(
@@ -239,11 +239,11 @@ class _Phases:
         end = float(way.distance[-1]) if ahead is None else ahead.distance - END_MARGIN
         if end - begin < LEAST_LENGTH:
             return None
-        own = [one for one in self._own if one.path in self._lateral]
-        actions = {one.path: self._driven_at(one.start) for one in own}
+        lateral = [one for one in self._own if one.path in self._lateral]
+        actions = {one.path: self._driven_at(one.start) for one in lateral}
         foreseen = (at for path, at in actions.items() if at > begin and path not in depends.begins)
         cut = min(foreseen, default=np.inf) if is_known else np.inf
-        trajectories = (one.path for one in own if isinstance(one.action.content, FollowTrajectoryAction))
+        trajectories = (one.path for one in lateral if isinstance(one.action.content, FollowTrajectoryAction))
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
         offset: Offset = self._foreseeing if is_known else self._offset
         if start is not None:

@@ -121,7 +121,7 @@ def decide(
     _refuse_lane_offsets_for_carla(scenario, settings)
     egos = chosen_egos(scenario, settings)
     controllers = dict[str, Control]()  # none where everybody is replayed
-    if heeds_controllers(settings):
+    if respects_controllers(settings):
         controllers = {name: control for name, control in controlled_entities(scenario).items() if name not in egos}
     depends = dependence(scenario, (*egos, *controllers))
     context = None if settings.context is None else read_context(settings.context)
@@ -214,7 +214,7 @@ def other_egos(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str,
     )
 
 
-def heeds_controllers(settings: ConvertSettings) -> bool:
+def respects_controllers(settings: ConvertSettings) -> bool:
     """Whether what a controller drives stays its own; else the default driver drives it."""
     return settings.mode is not OutputMode.TRAJECTORY and (settings.ego is None or bool(settings.ego))
 
@@ -227,7 +227,7 @@ def _extended_by_trials(
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if settings.mode is not OutputMode.AUTO or _is_replay(settings, depends) or not ends:
         return played
-    runs = prepared.meaning(egos)
+    runs = prepared.equivalence(egos)
     end = min(
         max(runs.end, LEAST_EXTENSION * played.motion.end_time), LARGEST_EXTENSION * played.motion.end_time, runs.limit
     )

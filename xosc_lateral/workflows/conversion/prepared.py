@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.source import check_regular, guard_input, state_key
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun
+from xosc_lateral.workflows.conversion.event_equivalence import EventEquivalence, ending_at
 from xosc_lateral.workflows.conversion.load import Played, load_scenario, play_loaded, road_network
-from xosc_lateral.workflows.conversion.meaning import Meaning, ending_at
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.player.player import play
 
@@ -30,10 +30,10 @@ class Prepared:
         self.played = play_loaded(self.loaded, self._step, self._time_limit)
         self._latest: dict[str, tuple[Hashable, object]] = {}
 
-    def meaning(self, egos: tuple[str, ...]) -> Meaning:
+    def equivalence(self, egos: tuple[str, ...]) -> EventEquivalence:
         """What happens, also where these vehicles under test drive otherwise."""
         return self._latest_made(
-            "meaning", egos, lambda: Meaning(self.played, egos, step=self._step, time_limit=self._time_limit)
+            "meaning", egos, lambda: EventEquivalence(self.played, egos, step=self._step, time_limit=self._time_limit)
         )
 
     def until(self, end: float) -> Played:

@@ -13,10 +13,10 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.workflows.conversion.driver_context import SAMPLE_STEP
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
-from xosc_lateral.workflows.conversion.seen import SAMPLE_STEP
 from xosc_lateral.world.surroundings.context import Surroundings
 
 Converted = Callable[[str, int], FloatArray]

@@ -146,7 +146,7 @@ def shown_rows(motion: EntityMotion) -> IntArray:
     return np.arange(0, len(motion.time), max(1, round(ROW_STEP / step)))
 
 
-def untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+def nominal_result(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
     """An entity as it moves nominally."""
     no_deviation = np.broadcast_to(0.0, len(entity.time))
     return EntityResult(entity, spans, None, why, (), no_deviation, entity)

@@ -12,7 +12,7 @@ from xosc_lateral.files.pages.page import format_value
 from xosc_lateral.workflows.conversion.page import key_figures
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
 from xosc_lateral.workflows.playing.figures import paths_stretched
-from xosc_lateral.workflows.playing.picture import Scene, marked
+from xosc_lateral.workflows.playing.picture import PictureScene, marked
 from xosc_lateral.workflows.playing.scene import scene_of
 
 SUMMARY_SUFFIXES = (".md", ".markdown")
@@ -61,7 +61,7 @@ def summary_of(conversion: ConvertedScenario, path: Path) -> dict[Path, str]:
         pictures[paths] = marked(figure.svg())
         farthest = max(done, key=lambda entity: float(np.abs(entity.deviation).max()))
         time = float(farthest.motion.time[np.argmax(np.abs(farthest.deviation))])
-        scene = Scene(scene_of(enriched.motion, enriched.network, enriched.entities))
+        scene = PictureScene(scene_of(enriched.motion, enriched.network, enriched.entities))
         pictures[moment] = marked(scene.picture(time, farthest.name).svg())
         what = f"{_cell(farthest.name)} at {time:.1f} s, farthest from where it was written (dashed)"
         lines += ["", f"![Paths, dashed as written]({quote(paths.name)})", "", f"{what}:", ""]

@@ -67,9 +67,9 @@ def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
         content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    found = [paths_of(entity, plan, lifelike=lifelike) for entity in reactive]
-    written = write_with([path for paths, _ in found for path in paths], plan, sampled, vehicles, provenance)
-    return replace(written, stays=tuple(line for _, lines in found for line in lines))
+    phases = [paths_of(entity, plan, lifelike=lifelike) for entity in reactive]
+    written = write_with([path for paths, _ in phases for path in paths], plan, sampled, vehicles, provenance)
+    return replace(written, stays=tuple(line for _, lines in phases for line in lines))
 
 
 def write_with(

@@ -76,9 +76,9 @@ def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any]
     measured = {view.number: view.measured for view in views}
     first = min(track.first for track in scene.tracks)
     last = max(track.first + len(track) for track in scene.tracks)
-    nobody = np.random.default_rng(0)  # the ego, say, knows itself: a sensor without errors draws nothing
+    rng = np.random.default_rng(0)  # the ego, say, knows itself: a sensor without errors draws nothing
     known = [
-        _columns(track, measured.get(number) or measure(track, PERFECT_SENSOR, nobody), scene)
+        _columns(track, measured.get(number) or measure(track, PERFECT_SENSOR, rng), scene)
         for number, track in enumerate(scene.tracks)
     ]
     for instant in range(first, last):

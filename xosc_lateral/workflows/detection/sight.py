@@ -38,7 +38,7 @@ HEADINGS = ("source", "sensor", "moments", "second car seen", "its width seen", 
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class SightMoment:
     """A vehicle behind two others in its lane."""
 
     cluster: str  # of the observer
@@ -48,7 +48,7 @@ class Moment:
     lane: float  # of the lane's centre up to the second one that is seen [m]
 
 
-def moments_of(scene: Scene) -> Iterator[Moment]:
+def moments_of(scene: Scene) -> Iterator[SightMoment]:
     """Of every vehicle, or of the ego alone, at every whole second."""
     if not all({"x", "line"} <= track.columns.keys() for track in scene.tracks):
         return
@@ -85,7 +85,7 @@ def moments_of(scene: Scene) -> Iterator[Moment]:
             centre = _lane_centre([number, *in_lane.tolist()], x, y, offset, along)
             centre = centre[(centre - sensor) @ np.array([cos, sin]) > 0.0]
             visible = points_seen(sensor, centre, seen)
-            yield Moment(track.cluster, float(distance), float(gap), share, LANE_STEP * float(visible.sum()))
+            yield SightMoment(track.cluster, float(distance), float(gap), share, LANE_STEP * float(visible.sum()))
 
 
 def _state(track: LaneTrack, row: int) -> list[float]:
@@ -126,7 +126,7 @@ def _lane_centre(
 class Sight(Result):
     """What sensors see past the car ahead, by source."""
 
-    moments: Mapping[str, Sequence[Moment]]  # label of the source -> moments
+    moments: Mapping[str, Sequence[SightMoment]]  # label of the source -> moments
     origins: Sequence[Source]
     seed: int
     files: Sequence[Path]  # that must not be overwritten
@@ -235,7 +235,7 @@ def sight_of(sources: Sequence[Source], seed: int, files: Sequence[Path]) -> Sig
     return Sight(moments, sources, seed, files)
 
 
-def _summary(moments: Sequence[Moment]) -> dict[str, Any]:
+def _summary(moments: Sequence[SightMoment]) -> dict[str, Any]:
     shares = np.array([one.share for one in moments])
     names, number = np.unique([one.cluster for one in moments], return_inverse=True)
     low = high = np.nan

@@ -137,8 +137,8 @@ def _lifelike(
     ego = None if settings.ego is None else frozenset({settings.ego} - {"none"})
 
     def scenes() -> Iterator[Scene]:
-        for scenario, name, own, number in named:
-            convert = replace(own, profile=profile, ego=ego)
+        for scenario, name, requested, number in named:
+            convert = replace(requested, profile=profile, ego=ego)
             prepared = prepare(scenario, convert)
             for variant in range(settings.variants):
                 index = number * settings.variants + variant  # each set has offsets of its own

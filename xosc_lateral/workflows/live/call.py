@@ -18,7 +18,7 @@ from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile, write_table
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.live.scene import Scene
+    from xosc_lateral.workflows.live.scene import SimulatorScene
 
 STATE_COLUMNS = (*RECOGNISED_BY, "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
@@ -61,7 +61,7 @@ def live_esmini(
     from xosc_lateral.workflows.conversion.result import Neighbours
     from xosc_lateral.workflows.live.esmini import EsminiTraffic
     from xosc_lateral.workflows.live.esmini_library import open_player
-    from xosc_lateral.workflows.live.scene import Scene
+    from xosc_lateral.workflows.live.scene import SimulatorScene
 
     chosen = given_profile(profile, folders)
     others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
@@ -84,7 +84,7 @@ def live_esmini(
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
     under_test = [one.name for one in traffic.entities if one.name in traffic.ego]
-    scene = Scene(traffic.entities, lambda: traffic.network, under_test)
+    scene = SimulatorScene(traffic.entities, lambda: traffic.network, under_test)
     standing = [name for name in sorted(traffic.waits) if len({row[2:4] for row in rows if row[1] == name}) == 1]
     stood = [f"{name!r} stood all the time: its controller waits for another program; drive it in a loop of your own "
              "with EsminiTraffic" for name in standing]  # fmt: skip
@@ -114,7 +114,7 @@ def live_sumo(
     `SimulationError` in one line.
     """
     from xosc_lateral.workflows.conversion.result import Neighbours
-    from xosc_lateral.workflows.live.scene import Scene, sumo_network
+    from xosc_lateral.workflows.live.scene import SimulatorScene, sumo_network
     from xosc_lateral.workflows.live.sumo import SumoTraffic, start
 
     chosen = given_profile(profile, folders)
@@ -140,7 +140,7 @@ def live_sumo(
     settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
     counts = [f"SUMO reports {count} {what}" for what, count in traffic.counts.items() if count]
     under_test = [name for name in traffic.entities if name in traffic.ego]
-    scene = Scene(tuple(traffic.entities.values()), partial(sumo_network, net), under_test, is_road=False)
+    scene = SimulatorScene(tuple(traffic.entities.values()), partial(sumo_network, net), under_test, is_road=False)
     noted = notes(not_driven({name: f"it is under test{traffic.ego.why(name)}" for name in under_test}))
     warned = warnings([*traffic.warnings, *traffic.traffic.fault_lines(), *counts])
     return LiveRun(rows, settings, (*warned, *noted), scene)
@@ -156,7 +156,7 @@ class LiveRun(Result):
         rows: Sequence[tuple[Any, ...]],
         settings: Mapping[str, Any],
         messages: Sequence[Note],
-        scene: Scene,
+        scene: SimulatorScene,
         events: Sequence[tuple[float, str, int]] = (),
     ) -> None:
         self._rows = pd.DataFrame(rows, columns=list(TRACE_COLUMNS))

@@ -129,9 +129,9 @@ class Ledger:
         """The driver's offset that a maneuver has dropped as it started; None: it has put the vehicle elsewhere. [m]"""
         if (told_place := known.told_place) is None or self.apart(told_place, state) <= SAME_PLACE:
             return None if told_place is None else 0.0
-        own = (known.place or 0.0) - (known.base or 0.0)
-        is_near = self.apart(told_place._replace(t=told_place.t - self.left_of(state) * own), state) < LANE_STEP
-        return own if is_near else None
+        offset = (known.place or 0.0) - (known.base or 0.0)
+        is_near = self.apart(told_place._replace(t=told_place.t - self.left_of(state) * offset), state) < LANE_STEP
+        return offset if is_near else None
 
     def room_to_middle(self, state: ObjectState) -> float:
         """How far a vehicle is from lane 0, on the side of the lane that it is on; below 0: it is across. [m]"""

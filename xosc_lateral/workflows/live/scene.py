@@ -37,7 +37,7 @@ ROW_COLUMNS = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset"
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class SimulatorScene:
     """Who was there, and where."""
 
     entities: Sequence[Entity]
@@ -46,7 +46,7 @@ class Scene:
     is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
 
 
-def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> Traffic:
+def motion_of(rows: pd.DataFrame, scene: SimulatorScene, network: RoadNetwork) -> Traffic:
     """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
     times = np.unique(rows["time"])
     index = {name: k for k, name in enumerate(network.road_ids)}

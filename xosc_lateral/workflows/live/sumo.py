@@ -29,7 +29,7 @@ from xosc_lateral.workflows.live.scene import CATEGORY_OF_CLASS, sumo_entity
 from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.workflows.live.under_test import UnderTest
 from xosc_lateral.world.scenario.entity import Entity
-from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, Reach
+from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, LaneStretch
 from xosc_lateral.world.surroundings.context import TRUCKS
 from xosc_lateral.world.surroundings.moment import Places
 
@@ -145,17 +145,17 @@ class SumoRoads:
         """See `Roads`: an edge is one."""
         return 0.0
 
-    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+    def path(self, road: int, lane: int, s: float) -> list[LaneStretch]:
         """See `Roads`."""
         edge = self._length[road, lane]
-        path = [Reach(road, 0.0, edge, lane, 0.0, s, 1)]
+        path = [LaneStretch(road, 0.0, edge, lane, 0.0, s, 1)]
         for neighbour, way in ((self._next, edge - s), (self._before, s)):
             name = self._name[road, lane]
             while way < SIGHT_DISTANCE + edge and (name := neighbour.get(name, "")):
                 place = self.place[name]
                 length = self._length[place]
                 begin = way if neighbour is self._next else -way - length
-                path.append(Reach(place[0], 0.0, length, place[1], begin, 0.0, 1))
+                path.append(LaneStretch(place[0], 0.0, length, place[1], begin, 0.0, 1))
                 way += length
         return path
 

@@ -33,7 +33,7 @@ MOST_PICTURES = 600
 ASPHALT, VERGE, PAINT, YELLOW = "#b9c0c6", "#dfe4e7", "#ffffff", "#e8b500"
 
 
-class Scene:
+class PictureScene:
     """The player's scene, seen at any time; `text`: as `scene_of` gives it."""
 
     def __init__(self, text: str) -> None:
@@ -168,7 +168,7 @@ def write_image(
     """
     output = output_file(path, f"{usual_name}.svg", IMAGE_SUFFIXES)
     claim([output], inputs, force=force)
-    shown = Scene(scene)
+    shown = PictureScene(scene)
     time = 0.5 * shown.end_time if at is None else at
     if not 0.0 <= time <= shown.end_time + GIF_STEP:
         raise ValueError(f"at {time:g} s: the run is from 0 to {shown.end_time:.1f} s")
@@ -195,7 +195,7 @@ def write_animation(
 
     output = output_file(path, f"{usual_name}.gif", ANIMATION_SUFFIXES)
     claim([output], inputs, force=force)
-    shown = Scene(scene)
+    shown = PictureScene(scene)
     times = np.arange(0.0, shown.end_time + 0.5 * GIF_STEP, GIF_STEP).tolist()
     if len(times) > MOST_PICTURES:
         raise ValueError(

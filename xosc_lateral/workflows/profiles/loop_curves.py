@@ -27,7 +27,7 @@ SHOWN_DRIVES, SHOWN_S = 3, 120.0  # Drives of which a stretch is drawn, and the 
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Curve:
+class ContextCurve:
     """A fitted effect over what drives it, and what was measured there."""
 
     over: FloatArray  # shape (n,): The column, or the product, in its own unit.
@@ -39,12 +39,12 @@ class Curve:
     measured_error: FloatArray
 
 
-def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
+def curve_of(result: LoopResult, effect: ColumnEffect) -> ContextCurve:
     """Curve of an effect that was found, with measured points where it acts on mean, spread or fine noise."""
     over, strength, error = _fitted(result, effect)
     nothing = np.zeros(0)
     if effect.acts is Acts.RATE:
-        return Curve(over, strength, error, nothing, nothing, nothing)
+        return ContextCurve(over, strength, error, nothing, nothing, nothing)
     where, strengths = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
     blocks = coarse_middle(hold_out_blocks(result.coarse.timeline))
@@ -53,7 +53,7 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
         mean, spread = 0.5 * np.log(np.maximum(mean, 1e-9)), 0.5 * spread / np.maximum(mean, 1e-9)
     # where the curve is zero is a matter of taste, so the points are shifted onto it as a whole
     shift = float(np.mean(fitted - mean)) if len(mean) else 0.0
-    return Curve(over, strength, error, seen, mean + shift, spread)
+    return ContextCurve(over, strength, error, seen, mean + shift, spread)
 
 
 def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> FloatArray:

@@ -131,7 +131,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
     lanes, following = list[FloatArray](), list[list[int]]()
     ends, starts = dict[tuple[int, int], int](), dict[tuple[int, int], int]()
     for number, line in enumerate(parts):
-        ordered = _apart(sorted(cuts[number]), len(line) - 1)
+        ordered = _without_close_cuts(sorted(cuts[number]), len(line) - 1)
         for first, last in pairwise(ordered):
             starts[number, first] = ends[number, last] = len(lanes)
             lanes.append(line[first : last + 1])
@@ -147,7 +147,7 @@ def lanes_of_streams(lines: list[FloatArray]) -> tuple[list[FloatArray], list[li
     return lanes, following
 
 
-def _apart(places: list[int], last: int) -> list[int]:
+def _without_close_cuts(places: list[int], last: int) -> list[int]:
     """Cuts of a line that are far enough from each other and from its ends."""
     kept = [0]
     for place in places:

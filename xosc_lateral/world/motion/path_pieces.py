@@ -104,7 +104,7 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
             if after.largest >= error.largest:
                 break
             times, error = refined, after
-    return _apart(times, _interpolated(times, time, x), _interpolated(times, time, y))
+    return _thinned(times, _interpolated(times, time, x), _interpolated(times, time, y))
 
 
 def _interpolated(moments: FloatArray, time: FloatArray, values: FloatArray) -> FloatArray:
@@ -112,7 +112,7 @@ def _interpolated(moments: FloatArray, time: FloatArray, values: FloatArray) -> 
     return np.concatenate([np.interp(moments[part], time, values) for part in blocks(len(moments))])
 
 
-def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+def _thinned(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     """Without vertices too close to their neighbours in the plane; the ends stay, or the first alone: no path."""
     if (np.hypot(np.diff(x), np.diff(y)) >= LEAST_SPACING).all():
         return times

@@ -80,7 +80,7 @@ class SegmentRow(Struct, frozen=True):
 
 
 def cut_segments(
-    motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False, heeds_controllers: bool = True
+    motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False, respects_controllers: bool = True
 ) -> tuple[SegmentSpan, ...]:
     """Cut an entity's motion into segments, each row into exactly one; teleports cut, trailers have no driver."""
     firsts: list[tuple[int, int]] = []  # rows at which segments begin, and their kinds
@@ -88,7 +88,7 @@ def cut_segments(
     for rows in blocks(len(motion.time)):
         kinds = np.zeros(rows.stop - rows.start, dtype=np.int64)
         # The first reason that applies, in the enum's order.
-        for kind, applies in reversed(_reasons(motion, network, rows, is_trailer, heeds_controllers).items()):
+        for kind, applies in reversed(_reasons(motion, network, rows, is_trailer, respects_controllers).items()):
             kinds[applies] = _KINDS.index(kind)
         placed_anew = (motion.activity[rows] & Activity.TELEPORTED) != 0
         cut = np.flatnonzero((np.diff(kinds, prepend=before) != 0) | placed_anew)
@@ -128,14 +128,14 @@ def _goes_on_through(motion: NominalMotion, entity: EntityMotion, network: RoadN
         return False
     ignored = (SegmentKind.LATERAL_ACTION, SegmentKind.ACROSS_LANE)
     for rows in blocks(span.last + 1, span.first):
-        reasons = _reasons(entity, network, rows, is_trailer=False, heeds_controllers=True)
+        reasons = _reasons(entity, network, rows, is_trailer=False, respects_controllers=True)
         if any(np.any(applies) for kind, applies in reasons.items() if kind not in ignored):
             return False
     return True
 
 
 def _reasons(
-    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, heeds_controllers: bool
+    motion: EntityMotion, network: RoadNetwork, rows: slice, is_trailer: bool, respects_controllers: bool
 ) -> dict[SegmentKind, BoolArray | bool]:
     """Where in these rows each kind applies, by the enum's order."""
     activity, road, lane, s = motion.activity[rows], motion.road[rows], motion.lane[rows], motion.s[rows]
@@ -147,7 +147,7 @@ def _reasons(
         SegmentKind.NOT_A_VEHICLE: not motion.entity.is_vehicle,
         SegmentKind.TRAILER: is_trailer,
         SegmentKind.OFF_ROAD: ~on_road,
-        SegmentKind.STEERED: heeds_controllers and (activity & Activity.STEERED) != 0,
+        SegmentKind.STEERED: respects_controllers and (activity & Activity.STEERED) != 0,
         SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,

@@ -33,7 +33,7 @@ INFLUENCE_DISTANCE = 40.0
 space for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
 
 
-class Reach(NamedTuple):
+class LaneStretch(NamedTuple):
     """A lane section within reach along the own lane: u(s) = at + sign * (s - s_entry) counts along travel. [m]"""
 
     road: int
@@ -45,10 +45,10 @@ class Reach(NamedTuple):
     sign: int
 
 
-def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[Reach]:
+def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[LaneStretch]:
     """Sections along a lane within `SIGHT_DISTANCE` both ways; their coordinate u is 0 at `s`, growing along travel."""
     low, high = network.section_at(road, s)
-    path = [Reach(road, low, high, lane, 0.0, s, forward)]
+    path = [LaneStretch(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
         here, direction, done = (road, lane, s), way * forward, 0.0
         while done < SIGHT_DISTANCE + (high - low):
@@ -61,7 +61,7 @@ def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int
             here, direction = (step.road, step.lane, step.s), step.direction
             start, end = network.section_at(step.road, step.s)
             s_entry = step.s - direction * _INTO_NEXT
-            path.append(Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
+            path.append(LaneStretch(step.road, start, end, step.lane, way * done, s_entry, way * direction))
     return path
 
 
@@ -82,7 +82,7 @@ ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
 
 
 def see_along(
-    path: Sequence[Reach],
+    path: Sequence[LaneStretch],
     own_u: FloatArray,
     own_offset: FloatArray,
     road: NDArray[np.integer],
@@ -129,7 +129,7 @@ def free_space(seen: OtherVehicles, box: BoundingBox | Extent, other: BoundingBo
 
 
 @dataclass(eq=False, slots=True)
-class Around:
+class NearestVehicles:
     """Who is around: on each side of `ZONES`; free space to who comes towards one [m], how far he is there [-]."""
 
     sides: Mapping[str, _Side]
@@ -137,7 +137,7 @@ class Around:
     oncoming_there: FloatArray
 
     @classmethod
-    def with_no_one(cls, n: int) -> Around:
+    def with_no_one(cls, n: int) -> NearestVehicles:
         """Nobody around anybody."""
         return cls({side: _Side.with_no_one(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
 

@@ -146,7 +146,7 @@ def _neighbours(
     every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = surroundings.traffic(int(grid[0]) % every, every)
     columns = grid // every
-    nearby = around.Around.with_no_one(len(grid))
+    nearby = around.NearestVehicles.with_no_one(len(grid))
     groups = _own_lane_groups(observer, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(observer, network, grid)
     extent, box = traffic.extent, observer.entity.bounding_box
@@ -270,7 +270,7 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
 
 def _own_lane_groups(
     entity: EntityMotion, network: RoadNetwork, grid: IntArray, direction: NDArray[np.int8]
-) -> list[tuple[IntArray, FloatArray, list[around.Reach]]]:
+) -> list[tuple[IntArray, FloatArray, list[around.LaneStretch]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float, int], list[IntArray]] = {}
     on = np.flatnonzero(direction)

@@ -64,9 +64,9 @@ class SampledVehicle:
     # responds: sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are
     # widened by what that leaves to be widened
     responds: frozenset[str] = frozenset()
-    # alone: sides on which its answer to neighbours is known to be what its profile says: there the law moves it
+    # answer_known: sides on which its answer to neighbours is known to be what its profile says: there the law moves it
     # nowhere
-    alone: frozenset[str] = frozenset()
+    answer_known: frozenset[str] = frozenset()
 
 
 def give_way(
@@ -99,7 +99,7 @@ def give_way(
     can_move = [samples.can_move.any() for samples in sampled]
     responses = Response(*(
         np.array([side in getattr(samples, name) for samples in sampled], dtype=bool)
-        for name in ("responds", "alone") for side in ("left", "right")
+        for name in ("responds", "answer_known") for side in ("left", "right")
     ))  # fmt: skip
     for stretch, near_pairs in stretches_within(
         there_x, there_y, FADE_DISTANCE + length.max(initial=0.0) + REACH_MARGIN
@@ -111,7 +111,7 @@ def give_way(
             number, at = np.divmod(near, part[0].shape[1])
             vehicle, other = vehicle[number], other[number]
             first, second = (
-                Frame._make([*(table[one, at] for table in part[:-1]), length[one], width[one]])
+                BodyFrame._make([*(table[one, at] for table in part[:-1]), length[one], width[one]])
                 for one in (vehicle, other)
             )
             response = Response._make(column[vehicle] for column in responses)
@@ -151,7 +151,7 @@ def give_way_now(
     vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
     x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
     columns = (x, y, places.heading, deviation, can_move, places.length, places.width)
-    first, second = (Frame._make(column[one] for column in columns) for one in (vehicle, other))
+    first, second = (BodyFrame._make(column[one] for column in columns) for one in (vehicle, other))
     aside = moved_aside(first, second, Response._make(column[vehicle] for column in response), left_hand)
     left, right = np.zeros((2, n))
     np.maximum.at(right, vehicle, np.maximum(0.0 - aside, 0.0))
@@ -179,7 +179,7 @@ REACH_MARGIN = 10.0
 """Added to the reach for what lies aside: more than two widths and deviations. [m]"""
 
 
-class Frame(NamedTuple):
+class BodyFrame(NamedTuple):
     """Vehicles on rows: middle, heading, size, where present and free to move; one, or another in each row."""
 
     x: FloatArray
@@ -200,7 +200,7 @@ class Response(NamedTuple):
     alone_right: BoolArray
 
 
-def moved_aside(vehicle: Frame, other: Frame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
+def moved_aside(vehicle: BodyFrame, other: BodyFrame, response: Response, left_hand: bool | BoolArray) -> FloatArray:
     """By how much each moves aside for another that is near, positive left, shape (n,). [m]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles

@@ -26,7 +26,7 @@ class Roads(Protocol):
     def section(self, road: int, lane: int, s: float) -> float:
         """Where the lane section begins that a place is in: places of one section share a path. [m]"""
 
-    def path(self, road: int, lane: int, s: float) -> list[around.Reach]:
+    def path(self, road: int, lane: int, s: float) -> list[around.LaneStretch]:
         """Lane sections within reach along the lane, both ways."""
 
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
@@ -53,7 +53,7 @@ class OpenDriveRoads:
         """See `Roads`."""
         return self.network.section_at(road, s)[0]
 
-    def path(self, road: int, lane: int, s: float) -> list[around.Reach]:
+    def path(self, road: int, lane: int, s: float) -> list[around.LaneStretch]:
         """See `Roads`."""
         return around.lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
 
@@ -110,7 +110,7 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
     direction[on] = roads.directions(*where[:2])
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
-    nearby = around.Around.with_no_one(n)
+    nearby = around.NearestVehicles.with_no_one(n)
     for path, u, i, j in _along_paths(roads, places, on):
         seen = around.see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
         extents = (around.Extent(places.length[k], places.center_x[k]) for k in (i, j))
@@ -121,10 +121,10 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
 
 def _along_paths(
     roads: Roads, places: Places, on: IntArray
-) -> Iterator[tuple[list[around.Reach], FloatArray, IntArray, IntArray]]:
+) -> Iterator[tuple[list[around.LaneStretch], FloatArray, IntArray, IntArray]]:
     """For every lane path: the path, where everybody on it is along it [m], and pairs of one on it and one in sight."""
     u, group = np.zeros(len(places.x)), np.full(len(places.x), -1)
-    origins: dict[tuple[int, int, float], tuple[int, float, list[around.Reach]]] = {}
+    origins: dict[tuple[int, int, float], tuple[int, float, list[around.LaneStretch]]] = {}
     for k in on.tolist():
         road, lane, s = int(places.road[k]), int(places.lane[k]), float(places.s[k])
         key = (road, lane, roads.section(road, lane, s))

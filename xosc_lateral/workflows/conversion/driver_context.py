@@ -57,17 +57,17 @@ class SeenSegment(NamedTuple):
     responses: Responses  # see `responses_to`
 
 
-class Seen(NamedTuple):
+class DriverContext(NamedTuple):
     """All that a driver sees on his way, and how he answers to neighbours."""
 
     segments: tuple[SeenSegment, ...] = ()
     neutral: tuple[str, ...] = ()  # context columns that his profile asks for and that are not known
     responds: frozenset[str] = frozenset()
     """Sides on which the profile responds to neighbours by itself, as its population does."""
-    alone: frozenset[str] = frozenset()  # sides on which that is known of the driver himself: nothing is borrowed
+    answer_known: frozenset[str] = frozenset()  # sides on which that is known of the driver: none is borrowed
 
 
-NOTHING_SEEN = Seen()
+NOTHING_SEEN = DriverContext()
 
 
 def seen_by(
@@ -77,14 +77,14 @@ def seen_by(
     runs: Sequence[tuple[SegmentSpan, ...]],
     contexts: Contexts,
     neighbours: Neighbours,
-) -> Seen:
+) -> DriverContext:
     """What the driver of an entity sees on runs of spans; around are those whose place beside him is certain."""
     motion, network = surroundings.motion, surroundings.network
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
     driven = distance_driven(entity)
     segments: list[SeenSegment] = []
-    neutral, responds, alone = set[str](), set[str](), set[str]()
+    neutral, responds, answer_known = set[str](), set[str](), set[str]()
     for spans in runs:
         rows = np.arange(spans[0].first, spans[-1].last + 1, every)
         if len(rows) < 2:
@@ -104,10 +104,10 @@ def seen_by(
         is_left_hand = network.roads[int(entity.road[knots[0]])].rule == "LHT"
         other_hand = is_left_hand != driver.left_hand
         responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
-        alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
+        answer_known |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         segment, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         segments.append(SeenSegment(spans, knots, distance, segment, side, responses_to(segment, driver)))
-    return Seen(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+    return DriverContext(tuple(segments), tuple(sorted(neutral)), frozenset(responds), frozenset(answer_known))
 
 
 def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) -> tuple[IntArray, FloatArray]:

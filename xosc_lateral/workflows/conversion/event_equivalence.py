@@ -22,7 +22,7 @@ from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
-from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, EventShift, untouched
+from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, EventShift, nominal_result
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
@@ -75,7 +75,7 @@ Sizes = dict[int, float]
 """By the number of a path, where it is driven otherwise than sampled."""
 
 
-class Meaning:
+class EventEquivalence:
     """What happens in a source, nominally and under other egos; `egos`: vehicles under test; `time_limit` [s]."""
 
     def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
@@ -179,7 +179,7 @@ def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:
 
 
 @dataclass(frozen=True, slots=True)
-class KeptMeaning:
+class EquivalentPaths:
     """Paths that leave what happens as it was, the runs with them, and what is left that could not be mended."""
 
     paths: tuple[OffsetPath, ...]
@@ -239,11 +239,11 @@ class KeptMeaning:
         yield from (one.note for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
 
 
-def keep_meaning(
+def shrink_until_equivalent(
     paths: Sequence[OffsetPath],
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetPath], float], tuple[Output, list[Comparison]]],
-) -> tuple[Output, KeptMeaning]:
+) -> tuple[Output, EquivalentPaths]:
     """Paths as large as leave what happens as it was, and the output with them.
 
     `attempt` writes some and plays, until as much happens otherwise as it is told.
@@ -275,7 +275,7 @@ def keep_meaning(
     for name in dict.fromkeys(paths[k].entity for k in sizes):
         theirs = [k for k, path in enumerate(paths) if path.entity == name]
         least[name] = min(sizes.get(k, 1.0) for k in theirs), all(k in sizes for k in theirs)
-    return output, KeptMeaning(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
+    return output, EquivalentPaths(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
 def _changes(comparisons: Iterable[Comparison]) -> list[Change]:
@@ -330,7 +330,7 @@ def as_played(
     entities = tuple(
         _measured(entity, played[entity.name])
         if entity.name in moved
-        else untouched(entity.motion, entity.spans, CHANGES)
+        else nominal_result(entity.motion, entity.spans, CHANGES)
         if entity.name in unmoved
         else entity
         for entity in enriched.entities
