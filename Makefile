@@ -56,7 +56,7 @@ lint: style names
 test: style names
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m 'not lint and not pages'
 
-# What examples and pages print where they close a loop, the site, what is shipped: nightly, and before a release.
+# What examples and pages print where they close a loop, the site, what is shipped: before a release.
 pages: $(DEV_STAMP) $(DOCS_STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m pages
 

@@ -22,6 +22,7 @@ from laboratory.identification_cases import PROTOCOL, cases, planted_drive
 from tests.kit import simulated as plants
 from tests.kit.simulated import preview_driver
 from xosc_lateral.drivers.loop import (
+    autocorrelation,
     candidates,
     column_search,
     columns,
@@ -90,7 +91,16 @@ PARTS: dict[str, Callable[[], list[Any]]] = {
     "bias of short drives": lambda: [
         patch.object(model, "unbiased", lambda process, *rest, **more: process),
     ],
+    **{
+        f"{name} {value}": lambda owner=owner, name=name, value=value: [patch.object(owner, name, value)]
+        for owner, name, values in (
+            (column_search, "CONTENDERS", (1, 2, 8)),
+            (autocorrelation, "ROWS_PER_COEFFICIENT", (10, 40)),
+        )
+        for value in values
+    },
 }
+"""Also numbers that were chosen: named with half and twice of them, they say how much hangs on the choice."""
 SHORT_ONLY = frozenset({"bias of short drives"})
 
 
@@ -130,7 +140,8 @@ def main(argv: Sequence[str] | None = None) -> None:
                 missed += [name] if right and not hit else []
                 wrongs += [f"{name}: {one}" for one in wrong]
         took = time.perf_counter() - start
-        print(f"without {part}: {hits} of {asked} named, {len(wrongs)} wrong, {took:.0f} s", flush=True)
+        how = "with" if part[-1].isdigit() else "without"
+        print(f"{how} {part}: {hits} of {asked} named, {len(wrongs)} wrong, {took:.0f} s", flush=True)
         print(f"   missed: {'; '.join(missed)}\n   wrong: {'; '.join(wrongs)}", flush=True)
 
 
