@@ -312,6 +312,7 @@ def test_import_verb_writes_a_table_with_its_provenance(dlr_csv, tmp_path, capsy
     record = json.loads(capsys.readouterr().out)
     holds(record, "import")
     assert record.pop("output") == str(out)
+    assert [one["what"] for one in record.pop("messages")] == record["notes"]
     written = json.loads(pq.read_schema(out).metadata[METADATA_KEY])
     assert written.pop("package").startswith("xosc-lateral ")
     assert written == record
