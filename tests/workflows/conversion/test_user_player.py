@@ -64,7 +64,7 @@ def test_esmini_is_content_with_an_output_and_tells_of_a_cut_in_that_was_taken_o
             allowed=0.0,
         )
     )
-    assert any("event 'cut in' of 'T' happens 0 times instead of 1 (run: nominal)" in line for line in told), told
+    assert any("event 'cut in' of 'T' happens 0 times instead of 1 (run: nominal)" in str(note) for note in told), told
     assert [one.name for one in cut_in.parent.glob(".*")] == []
 
 
