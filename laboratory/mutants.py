@@ -1,9 +1,10 @@
 """Which share of small changes to our own code the tests of their room notice.
 
-A seeded sample of mutants by cosmic-ray's operators, one place each, of playback, road, model, loop and OpenSCENARIO's
-writer. A mutant is met by those tests of its room that run through its line, the most particular ones first, and is
-killed by the first that fails. Annotations and what classes are declared to be are no places. Works in a copy of what
-is committed; needs cosmic-ray, coverage and pytest-cov, which `make mutants` installs.
+A seeded sample of mutants by cosmic-ray's operators, one place each, of playback, road, surroundings, model, loop,
+OpenSCENARIO's writer, conversion, detection and recordings. A mutant is met by those tests of its room that run through
+its line, the most particular ones first, and is killed by the first that fails. Annotations and what classes are
+declared to be are no places. Works in a copy of what is committed; needs cosmic-ray, coverage and pytest-cov, which
+`make mutants` installs.
 
     python -m laboratory.mutants --count 200 --seed 1
 """
@@ -37,6 +38,10 @@ ROOMS = {
     "model": ("xosc_lateral/drivers/model", "tests/drivers/model"),
     "loop": ("xosc_lateral/drivers/loop", "tests/drivers/loop"),
     "writer": ("xosc_lateral/files/openscenario/write", "tests/files"),
+    "surroundings": ("xosc_lateral/world/surroundings", "tests/world/surroundings"),
+    "conversion": ("xosc_lateral/workflows/conversion", "tests/workflows/conversion"),
+    "detection": ("xosc_lateral/workflows/detection", "tests/workflows/detection"),
+    "recordings": ("xosc_lateral/workflows/recordings", "tests/workflows/recordings"),
 }
 LEFT_OUT = ("Decorator", "_Is", "ExceptionReplacer")
 """Operators whose mutants fail at once, or are the same program as long as Python keeps small numbers."""
