@@ -165,6 +165,9 @@ def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_trave
         together(drive(network, entity(), lane=2, start=650.0), actions=(action,)), network, 0, GRID
     )
     np.testing.assert_allclose(against["wind_direction"][since], 270.0)
+    own = drive(network, entity(), lane=-2, start=0.0)
+    turned = together(own.having(heading=np.full(len(own), np.radians(30.0))), actions=(action,))
+    np.testing.assert_allclose(entity_context(turned, network, 0, GRID)["wind_direction"][since], 60.0)
 
 
 def test_a_scenario_without_weather_supplies_none(tmp_path: Path) -> None:

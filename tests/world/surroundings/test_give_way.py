@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from tests.kit.motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.kit.profiles import simulated_profile
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
+from xosc_lateral.world.scenario.enums import EntityCategory
 from xosc_lateral.world.surroundings.give_way import (
     GAP_QUANTILES,
     OVERTAKING_SHARE,
@@ -53,6 +55,18 @@ def test_who_is_far_away_or_comes_the_other_way_changes_nobody(tmp_path: Path) -
     oncoming = (drive(network, entity("oncoming"), lane=1, start=700.0), 0.9)
     assert moved(network, *pair, far, oncoming)[:2] == alone
     assert moved(network, far, pair[1], oncoming, pair[0])[1::2] == alone[::-1]
+
+
+def test_nobody_makes_room_for_who_walks(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    car = drive(network, entity("car"), lane=-2, start=100.0)
+    beside = {
+        category: drive(network, structs.replace(entity(category.value), category=category), lane=-1, start=100.0)
+        for category in (EntityCategory.VEHICLE, EntityCategory.PEDESTRIAN)
+    }
+    pushes = {kind: moved(network, (car, 0.6), (other, -0.53))[0] for kind, other in beside.items()}
+    assert pushes[EntityCategory.VEHICLE] < -0.05
+    assert pushes[EntityCategory.PEDESTRIAN] == 0.0
 
 
 def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
