@@ -47,6 +47,12 @@ def test_a_note_names_file_line_element_and_run():
     }  # fmt: skip
 
 
+def test_a_copy_of_what_lies_elsewhere_is_named_as_its_owner_knows_it():
+    copy = Note("is late", "/tmp/xosc-lateral-a1b2c3d4/elsewhere/s3/bucket/a.xosc", 3)
+    assert str(copy) == "s3://bucket/a.xosc:3: is late"
+    assert copy.to_dict()["path"] == "s3://bucket/a.xosc"
+
+
 def test_a_repair_of_the_road_is_told_by_every_verb_that_plays(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     repaired = "geometry of length 0 m left out"

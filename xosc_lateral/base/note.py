@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from xosc_lateral.base.errors import MEMORY_FOLDER, locate, printable
+from xosc_lateral.base.errors import by_owner, locate, printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +25,11 @@ class Note:
         """One line: file, line, element, what, run."""
         run = f" (run: {self.run})" if self.run else ""
         line = locate(self.what + run, path=self.path, line=self.line, element=self.element)
-        return printable(MEMORY_FOLDER.sub("", " ".join(line.split())))
+        return printable(by_owner(" ".join(line.split())))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        path = None if self.path is None else MEMORY_FOLDER.sub("", self.path)
+        path = None if self.path is None else by_owner(self.path)
         place = {"path": path, "line": self.line, "element": self.element}
         about = {"entity": self.entity, "run": self.run}
         return {"severity": "warning" if self.is_warning else "note", "what": self.what, **place, **about}
