@@ -45,7 +45,7 @@ from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor,
 from xosc_lateral.workflows.detection.scoring import Tally
 from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
 from xosc_lateral.workflows.detection.tracks import STEP, Scene
-from xosc_lateral.workflows.detection.tuning import Learner, Views, carried, out_of_fold, read_goal, scored
+from xosc_lateral.workflows.detection.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
 from xosc_lateral.workflows.recordings.maneuvers import maneuvers_of
 from xosc_lateral.workflows.recordings.recorded import place_tracks
 from xosc_lateral.workflows.recordings.recordings import read_recording
@@ -188,28 +188,6 @@ def homes_of(wheel: Path, half: int, seed: int, names: Sequence[str]) -> Iterato
                     yield home, views_without_observers(scenes, sensor)
     if "real" in names:
         yield "real", real_half(wheel, half)
-
-
-class AtLimits(Detector):
-    """A detector at some thresholds alone, in order."""
-
-    def __init__(self, detector: Detector, limits: Sequence[float]) -> None:
-        self.detector, self.chosen_limits = detector, np.array(limits)
-        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
-
-    @property
-    def limits(self) -> FloatArray:
-        """See `Detector`."""
-        return self.chosen_limits
-
-    @property
-    def chosen(self) -> int:
-        """See `Detector`."""
-        return 0
-
-    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
-        """See `Detector`."""
-        return self.detector.scores(scene, views)
 
 
 def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequence[Views]) -> Iterator[dict[str, Any]]:

@@ -71,8 +71,7 @@ def fit(
     reply.say_words(describe_profile(profile), facts)
     warned = [*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))]
     warn(warned)
-    if strict and warned:
-        raise typer.Exit(1)
+    refuse_warnings(warned, strict)
 
 
 @command(
@@ -100,7 +99,7 @@ def sample(
         written = made.write(output, force=reply.force)
         reply.say_words(f"{made.headline()} in {written}", {"output": str(written), **made.to_dict()})
     warn(made.warnings)
-    refuse_warnings(made, strict)
+    refuse_warnings(made.warnings, strict)
 
 
 @command(app, "evaluate", VERBS["evaluate"], "evaluate drives.csv.gz -p mine.json --report evaluation.html")

@@ -65,7 +65,7 @@ class Outputs:
                 run.write_osi(trace, force=reply.force)
         warn(run.warnings)
         reply.say(run)
-        refuse_warnings(run, self.strict)
+        refuse_warnings(run.warnings, self.strict)
 
 
 @command(

@@ -81,7 +81,7 @@ def states(
         for note in played.notes:
             say(note, err=True)
     warn(played.warnings)
-    refuse_warnings(played, options["strict"])
+    refuse_warnings(played.warnings, options["strict"])
 
 
 @command(app, "segments", VERBS["segments"], "segments cut-in.xosc", "segments cut-in.xosc --json")
@@ -94,7 +94,7 @@ def segments(
     reply.say(listed)
     if reply.as_json or reply.quiet:
         warn(listed.warnings)
-    refuse_warnings(listed, options["strict"])
+    refuse_warnings(listed.warnings, options["strict"])
 
 
 @command(
@@ -146,7 +146,7 @@ def view(
                 write(True)
             except xl.XoscLateralError as error:  # a file that is being edited may be broken for a while
                 say(error, err=True)
-    refuse_warnings(played, options.get("strict", False))
+    refuse_warnings(played.warnings, options.get("strict", False))
 
 
 group = typer.Typer(help="Maneuver-based motorway scenarios to start from.", no_args_is_help=True)

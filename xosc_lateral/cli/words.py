@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass
 from functools import wraps
@@ -15,7 +15,6 @@ import typer
 
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
-from xosc_lateral.base.note import Telling
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
 
 if TYPE_CHECKING:
@@ -126,9 +125,9 @@ class Mapped:
         return as_mapping(self.mapping_file).with_words(pairs(self.columns, "--map"))
 
 
-def refuse_warnings(result: Telling, strict: bool) -> None:
+def refuse_warnings(lines: Collection[str], strict: bool) -> None:
     """End with exit code 1 where something was warned of, and nothing may be."""
-    if strict and result.warnings:
+    if strict and lines:
         raise typer.Exit(1)
 
 

@@ -152,16 +152,14 @@ def _outcomes(
                     outcome = _noted(job, reply, journal, todo[job.name][1])
                     failed |= {job.output.parent} if outcome.row.error else set()
                     yield outcome
-        if batch.shard and address(batch.folder):
-            pass  # there are no locks: the journal stays for the run of the whole that ends the batch
-        elif batch.shard:
+        if not batch.shard:
+            _finish(journal, batch, planned, runs[0])
+        elif not address(batch.folder):  # where there are no locks, the run of the whole ends the batch
             with whole_folder(batch.folder) as run:
                 whole = Journal(batch.folder, batch.folder / STATE_FOLDER / "journal.jsonl", notify)
                 whole.take_over(journal)
                 _finish(whole, batch, planned | batch.elsewhere, run)
             journal.drop()
-        else:
-            _finish(journal, batch, planned, runs[0])
         remove_empty(place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents)
 
 

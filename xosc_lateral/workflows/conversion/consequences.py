@@ -10,6 +10,7 @@ from xosc_lateral.base.arrays import BoolArray
 from xosc_lateral.base.rows import blocks, slices_where
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
+from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.network import RoadNetwork
 
 
@@ -50,14 +51,18 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
 
 def stay_as_written(enriched: Enriched) -> tuple[str, ...]:
     """Lane changes on trajectories that stay as written although they are to be lifelike."""
-    lines = []
-    for entity in enriched.entities:
-        for crossing in entity.crossings if entity.is_enriched else ():
-            if crossing.stays:
-                what = "lane change" if crossing.is_lane_change else "lane offset"
-                at = entity.motion.time[crossing.first]
-                lines.append(f"{what} of '{entity.name}' at {at:.1f} s stays as written: {crossing.stays}")
-    return tuple(lines)
+    return tuple(
+        stays_as_written(entity.motion, crossing, crossing.stays)
+        for entity in enriched.entities
+        for crossing in (entity.crossings if entity.is_enriched else ())
+        if crossing.stays
+    )
+
+
+def stays_as_written(motion: EntityMotion, crossing: Crossing, why: str) -> str:
+    """Of one, in a line."""
+    what = "lane change" if crossing.is_lane_change else "lane offset"
+    return f"{what} of '{motion.name}' at {motion.time[crossing.first]:.1f} s stays as written: {why}"
 
 
 def validity_warnings(enriched: Enriched) -> tuple[str, ...]:

@@ -206,7 +206,7 @@ class EquivalentPaths:
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        return tuple(str(one.note) for one in self.changes if one.pair is not None and one.pair not in nominal)
+        return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
 
     def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
         """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.

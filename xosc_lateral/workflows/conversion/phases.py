@@ -15,6 +15,7 @@ from xosc_lateral.base.own_clock import way_of as way_of_clock
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
 from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept
+from xosc_lateral.workflows.conversion.consequences import stays_as_written
 from xosc_lateral.workflows.conversion.movement import DRIVING_SPEED
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
@@ -115,8 +116,7 @@ class _Phases:
         runs = movement_runs(self._plan.extended.motion, motion, self._network, self._entity.spans)
         for crossing in crossings(self._plan.extended.motion, motion, runs):
             if why := crossing.stays or self._kept_for(crossing):
-                what = f"{'lane change' if crossing.is_lane_change else 'lane offset'} of '{motion.name}'"
-                self.stays.append(f"{what} at {motion.time[crossing.first]:.1f} s stays as written: {why}")
+                self.stays.append(stays_as_written(motion, crossing, why))
             else:
                 self._crossed[crossing.path] = self._driven_at(sum(bell_time(motion, crossing)))
                 self.across[crossing.path] = self._across(crossing)

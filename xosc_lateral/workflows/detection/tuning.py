@@ -116,21 +116,25 @@ class Carried(Detector):
         return self.detector.title()
 
 
-class _OnGrid(Detector):
-    """A detector over the thresholds at which something changes at home."""
+class AtLimits(Detector):
+    """A detector at some limits alone, increasing."""
 
     def __init__(self, detector: Detector, limits: FloatArray) -> None:
         self.detector, self._limits = detector, limits
+        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
 
     @property
     def limits(self) -> FloatArray:
+        """See `Detector`."""
         return self._limits
 
     @property
     def chosen(self) -> int:
+        """See `Detector`."""
         return 0
 
     def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
+        """See `Detector`."""
         return self.detector.scores(scene, views)
 
 
@@ -245,7 +249,7 @@ def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], so
 
 
 def _curve(detector: Detector, at_home: Sequence[Scored], source: str) -> Curve:
-    tally = Tally(_OnGrid(detector, _grid(detector, at_home)), source)
+    tally = Tally(AtLimits(detector, _grid(detector, at_home)), source)
     for each in at_home:
         tally.count(each.scene, each.view, each.score)
     return tally.curve()

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
     from xosc_lateral.files.openscenario.write.draft import Draft
     from xosc_lateral.workflows.conversion.load import Played
+    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
     from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
 
 
@@ -110,8 +111,9 @@ def _drawn(
 ) -> _Drawn:
     """Draw; the draft's lane changes refer to these parameters."""
     from xosc_lateral.files.openscenario.references import parameter_name
+    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 
-    changes = _lane_changes(draft, played)
+    changes, lanes = _lane_changes(draft, played), RoadLanes(played.network)
     declarations = draft.root.find("{*}ParameterDeclarations")
     if declarations is None:
         declarations = etree.Element("ParameterDeclarations")
@@ -134,7 +136,7 @@ def _drawn(
             dynamics.set("value", f"${name}")
         vehicle = next(one for one in played.motion.entities if one.name == action.actor)
         row = min(int(np.searchsorted(vehicle.time, action.start)), len(vehicle.time) - 1)
-        weights = _weights(action, vehicle, row, played, maneuvers)
+        weights = _weights(action, vehicle, row, played, lanes, maneuvers)
         rows = rng.choice(len(weights), size=count, p=weights)
         drawn.durations[name] = np.round(maneuvers.column("duration")[rows], 3).tolist()
         if with_speeds and draft.version >= (1, 1) and _keeps_speed(action, played):  # 1.0 has no expressions
@@ -195,15 +197,16 @@ def _free_name(wanted: str, taken: set[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
-def _weights(action: PlayedAction, vehicle: EntityMotion, row: int, played: Played, maneuvers: Maneuvers) -> FloatArray:
+def _weights(
+    action: PlayedAction, vehicle: EntityMotion, row: int, played: Played, lanes: RoadLanes, maneuvers: Maneuvers
+) -> FloatArray:
     """Of the profile's rows, by what the scenario's vehicle does in the row in which it begins to change lanes."""
     from xosc_lateral.workflows.recordings.encounters import vehicle_ahead
-    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
 
     end = float(vehicle.time[-1]) if action.end is None else action.end
     width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
     left = leads_left(vehicle, played.network, action.start, end)
-    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, RoadLanes(played.network))
+    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, lanes)
     return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width, gap=gap)
 
 

@@ -80,9 +80,8 @@ def _at(plan: VehiclePlan, time: float) -> At | None:
     vehicle = plan.vehicle
     if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
         return None
-    row, s = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1), _along(plan, np.array([time]))
-    way, box = int(vehicle.way(slice(row, row + 1))[0]), vehicle.box
-    return At(int(vehicle.road[row]), int(vehicle.lane[row]), way, float(s[0]), box.center_x, box.length)
+    row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
+    return At.of(vehicle, row, float(_along(plan, np.array([time]))[0]))
 
 
 def vehicle_ahead(
@@ -95,12 +94,7 @@ def vehicle_ahead(
     number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
     if number is None:
         return np.nan, np.nan
-    places = [
-        At(int(one.road[k]), int(one.lane[k]), int(one.way(slice(k, k + 1))[0]), float(one.s[k]), one.box.center_x,
-           one.box.length)
-        for one, k in there
-    ]  # fmt: skip
-    ahead, _ = lanes.nearest(places, number)
+    ahead, _ = lanes.nearest([At.of(one, k) for one, k in there], number)
     if ahead is None or ahead[1] >= ENCOUNTER_DISTANCE:
         return np.nan, np.nan
     other, other_row = there[ahead[0]]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.drivers.drives.drive import MAX_GAP
+from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.lanes import DRIVING, beside
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -103,6 +104,12 @@ class At(NamedTuple):
     s: float  # of its reference point [m]
     ahead: float  # of that, its middle [m]
     length: float  # [m]
+
+    @classmethod
+    def of(cls, motion: EntityMotion, row: int, s: float | None = None) -> At:
+        """In the lane of a row; `s`: a place along it other than the row's. [m]"""
+        way, along = int(motion.way(slice(row, row + 1))[0]), float(motion.s[row]) if s is None else s
+        return cls(int(motion.road[row]), int(motion.lane[row]), way, along, motion.box.center_x, motion.box.length)
 
 
 class RoadLanes:
