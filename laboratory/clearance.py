@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drivers.loop.residual import simulated_runs
-from xosc_lateral.drivers.loop.timeline import Timeline, join_drives
+from xosc_lateral.extras.loop.residual import simulated_runs
+from xosc_lateral.extras.loop.timeline import Timeline, join_drives
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.profiles import read_profile
 

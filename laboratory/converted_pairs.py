@@ -27,7 +27,7 @@ from laboratory.clearance import BANDS, FAR, Clearance, band_name, resampled, wi
 from laboratory.markers import write_between_markers
 from laboratory.pair_scenarios import FAST, ROADS, SLOW, Driven, Road, write_scenario
 from laboratory.storyboard import Vehicle
-from xosc_lateral.drivers.loop.timeline import join_drives
+from xosc_lateral.extras.loop.timeline import join_drives
 from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]

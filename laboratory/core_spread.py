@@ -27,9 +27,9 @@ from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coa
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate
 from xosc_lateral.drivers.fitting.models.likelihood import fit_autoregression
-from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression, stabilise
+from xosc_lateral.extras.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.files.drives import read_drives
 
 FloatArray = NDArray[np.float64]

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.extras.detect.detectors import Detector
+from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.scoring import Curve, Tally
+from xosc_lateral.extras.detect.tracks import Scene
 from xosc_lateral.files.pages.chart import BLUE, DASHED, GREEN, MUTED, VERMILLION
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.workflows.detection.detectors import Detector
-from xosc_lateral.workflows.detection.observation import View
-from xosc_lateral.workflows.detection.scoring import Curve, Tally
-from xosc_lateral.workflows.detection.tracks import Scene
 
 FloatArray = NDArray[np.float64]
 Views = list[tuple[Scene, list[View]]]

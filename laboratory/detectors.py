@@ -29,11 +29,11 @@ from laboratory.detector_table import (
 from laboratory.markers import show
 from laboratory.shortcut import played_variants, shortcut_lines
 from xosc_lateral.base.plugins import shipped_folder
+from xosc_lateral.extras.detect.detectors import RULES, LateralSpeed
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, views_of
+from xosc_lateral.extras.detect.sources import SourceSettings, checked, drive_scenes, sources_of
+from xosc_lateral.extras.detect.tracks import Scene
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.detection.detectors import RULES, LateralSpeed
-from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor, View, views_of
-from xosc_lateral.workflows.detection.sources import SourceSettings, checked, drive_scenes, sources_of
-from xosc_lateral.workflows.detection.tracks import Scene
 
 Views = list[tuple[Scene, list[View]]]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from xosc_lateral.workflows.recordings.importers.dlr_ht import (
+from xosc_lateral.extras.recordings.importers.dlr_ht import (
     STEP,
     fit_reference_line,
     import_dlr_ht,

@@ -9,9 +9,9 @@ import pandas as pd
 
 from laboratory.identification_cases import as_provided
 from laboratory.identification_drives import parts_of, unit, with_mean
-from xosc_lateral.drivers.loop.model import fit_model
-from xosc_lateral.drivers.loop.significance import LEAST_SHIFT_S, MANY_DRIVES
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.extras.loop.model import fit_model
+from xosc_lateral.extras.loop.significance import LEAST_SHIFT_S, MANY_DRIVES
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 from xosc_lateral.files.drives import drives_of_table
 
 Values = np.ndarray

@@ -24,9 +24,9 @@ from laboratory.identification_cases import PROTOCOL, SETS, cases, planted_drive
 from laboratory.identification_oracle import coarse_of, oracle, oracle_between
 from laboratory.identification_tables import calibration, summary, table
 from laboratory.outcome_lines import append_outcome, read_outcomes
-from xosc_lateral.drivers.loop.identify import VETOED, identify
-from xosc_lateral.drivers.loop.selection import TERMS
-from xosc_lateral.drivers.loop.timeline import Coarse, coarse_mean
+from xosc_lateral.extras.loop.identify import VETOED, identify
+from xosc_lateral.extras.loop.selection import TERMS
+from xosc_lateral.extras.loop.timeline import Coarse, coarse_mean
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laboratory.markers import show
-from xosc_lateral.workflows.recordings import lanes_from_tracks
-from xosc_lateral.workflows.recordings.cuts import KEPT_ROWS
-from xosc_lateral.workflows.recordings.importers import dlr_ht
+from xosc_lateral.extras.recordings import lanes_from_tracks
+from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
+from xosc_lateral.extras.recordings.importers import dlr_ht
 from xosc_lateral.world.road.reference_line import fit_reference_line
 
 FloatArray = NDArray[np.float64]

@@ -41,10 +41,10 @@ from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fi
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
+from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
+from xosc_lateral.extras.recordings.importers.openacc import import_openacc
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
-from xosc_lateral.workflows.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
-from xosc_lateral.workflows.recordings.importers.openacc import import_openacc
 
 FloatArray = NDArray[np.float64]
 

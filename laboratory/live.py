@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 

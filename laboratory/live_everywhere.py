@@ -36,9 +36,9 @@ from lxml import etree
 from numpy.typing import NDArray
 
 import xosc_lateral as xl
+from xosc_lateral.extras.live.esmini import EsminiTraffic
+from xosc_lateral.files.esmini_library import Player, open_player
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.workflows.live.esmini import EsminiTraffic
-from xosc_lateral.workflows.live.esmini_library import Player, open_player
 
 STEP, EVERY = 0.01, 5
 """Of the player [s], and steps between looks at the acceleration."""

@@ -21,7 +21,7 @@ import pandas as pd
 
 import xosc_lateral as xl
 from tests.kit.sumo_run import write_run
-from xosc_lateral.workflows.live.sumo import SumoTraffic, start
+from xosc_lateral.extras.live.sumo import SumoTraffic, start
 
 STEP, NEAR, WIDTH = 0.2, 0.3, {0.0: 1.8, 1.0: 2.4}
 ALIGNED = 0.45

@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from laboratory.identification_cases import PROTOCOL, cases, planted_drive
 from tests.kit import simulated as plants
 from tests.kit.simulated import preview_driver
-from xosc_lateral.drivers.loop import (
+from xosc_lateral.extras.loop import (
     autocorrelation,
     candidates,
     column_search,
@@ -31,11 +31,11 @@ from xosc_lateral.drivers.loop import (
     refinement,
     selection,
 )
-from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.terms import spread
-from xosc_lateral.drivers.loop.terms.spread import SlowSpreadTerm
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.identify import usable_columns
+from xosc_lateral.extras.loop.terms import spread
+from xosc_lateral.extras.loop.terms.spread import SlowSpreadTerm
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 from xosc_lateral.files.drives import drives_of_table
 
 Named = tuple[frozenset[str], ...]

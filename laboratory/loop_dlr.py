@@ -17,11 +17,11 @@ from pathlib import Path
 from laboratory.library import SEED
 from laboratory.markers import show
 from laboratory.refined import refine_population
-from xosc_lateral.drivers.loop.close import LoopResult
-from xosc_lateral.drivers.loop.residual import LackOfFit
+from xosc_lateral.extras.loop.close import LoopResult
+from xosc_lateral.extras.loop.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure
+from xosc_lateral.extras.loop.loop_page import loop_text
+from xosc_lateral.extras.loop.residual import LackOfFit
 from xosc_lateral.files.drives import read_drives
-from xosc_lateral.workflows.profiles.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure
-from xosc_lateral.workflows.profiles.loop_page import loop_text
 
 
 def main() -> None:

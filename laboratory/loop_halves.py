@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t
 
-from xosc_lateral.drivers.loop.identify import held_out_gain, identify
-from xosc_lateral.drivers.loop.model import Term, fit_model
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.extras.loop.identify import held_out_gain, identify
+from xosc_lateral.extras.loop.model import Term, fit_model
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 from xosc_lateral.files.drives import read_drives
 
 

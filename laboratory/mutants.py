@@ -36,12 +36,12 @@ ROOMS = {
     "playback": ("xosc_lateral/world/player", "tests/world/player"),
     "road": ("xosc_lateral/world/road", "tests/world/road"),
     "model": ("xosc_lateral/drivers/model", "tests/drivers/model"),
-    "loop": ("xosc_lateral/drivers/loop", "tests/drivers/loop"),
+    "loop": ("xosc_lateral/extras/loop", "tests/extras/loop"),
     "writer": ("xosc_lateral/files/openscenario/write", "tests/files"),
     "surroundings": ("xosc_lateral/world/surroundings", "tests/world/surroundings"),
     "conversion": ("xosc_lateral/workflows/conversion", "tests/workflows/conversion"),
-    "detection": ("xosc_lateral/workflows/detection", "tests/workflows/detection"),
-    "recordings": ("xosc_lateral/workflows/recordings", "tests/workflows/recordings"),
+    "detection": ("xosc_lateral/extras/detect", "tests/extras/detect"),
+    "recordings": ("xosc_lateral/extras/recordings", "tests/extras/recordings"),
 }
 LEFT_OUT = ("Decorator", "_Is", "ExceptionReplacer")
 """Operators whose mutants fail at once, or are the same program as long as Python keeps small numbers."""

@@ -20,11 +20,11 @@ from laboratory.identification_cases import PROTOCOL
 from laboratory.identification_drives import long_drive, smoothed_tracks
 from laboratory.identification_oracle import coarse_of
 from laboratory.outcome_lines import append_outcome, read_outcomes
-from xosc_lateral.drivers.loop import significance
-from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.model import fit_model
-from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, STAGES
+from xosc_lateral.extras.loop import significance
+from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.identify import usable_columns
+from xosc_lateral.extras.loop.model import fit_model
+from xosc_lateral.extras.loop.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
 """Of drives that serve for nothing else; those from 300,000 on were what the null was mended with."""

@@ -119,7 +119,7 @@ def additive(offset: Values, columns: dict[str, Values], drive: Values) -> list[
     from statsmodels.gam.api import BSplines
     from statsmodels.stats.multitest import multipletests
 
-    from xosc_lateral.drivers.loop.autocorrelation import Whitener, fit_autoregression
+    from xosc_lateral.extras.loop.autocorrelation import Whitener, fit_autoregression
 
     valid = np.concatenate([[True], np.diff(drive) == 0])  # one second between drives
     level = np.bincount(drive, offset) / np.bincount(drive)

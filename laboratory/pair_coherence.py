@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from laboratory.dlr_stretches import Recording
 from laboratory.markers import show
-from xosc_lateral.workflows.recordings.importers.dlr_ht import STEP
+from xosc_lateral.extras.recordings.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -36,10 +36,10 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.profile_comparison import compare
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile
 from xosc_lateral.drivers.fitting.sensor import likelihood
-from xosc_lateral.drivers.loop.close import close_loop
 from xosc_lateral.drivers.model.plausibility import drivable, strain
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
+from xosc_lateral.extras.loop.close import close_loop
 from xosc_lateral.files.drives import drives_of_table
 
 FloatArray = NDArray[np.float64]

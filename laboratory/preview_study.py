@@ -25,13 +25,13 @@ from laboratory.identification_oracle import coarse_of, power_of_rotations
 from laboratory.outcome_lines import append_outcome, read_outcomes
 from tests.kit.simulated import preview_driver
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.drivers.loop.close import close_loop
-from xosc_lateral.drivers.loop.dictionary import Search, beside, orthonormal
-from xosc_lateral.drivers.loop.identify import name_time_beside, usable_columns
-from xosc_lateral.drivers.loop.model import CLIP, fit_model
-from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Accepted, select
-from xosc_lateral.drivers.loop.terms.mean import RESPONSE_S, CourseTerm
 from xosc_lateral.drivers.model.effects import Acts, Linear
+from xosc_lateral.extras.loop.close import close_loop
+from xosc_lateral.extras.loop.dictionary import Search, beside, orthonormal
+from xosc_lateral.extras.loop.identify import name_time_beside, usable_columns
+from xosc_lateral.extras.loop.model import CLIP, fit_model
+from xosc_lateral.extras.loop.selection import ERROR_BUDGET, Accepted, select
+from xosc_lateral.extras.loop.terms.mean import RESPONSE_S, CourseTerm
 from xosc_lateral.files.drives import drives_of_table
 
 BENDS = {"curvature", "crossfall", "speed"}

@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from laboratory import agreement
+from xosc_lateral.extras.recordings.importers import dlr_ht
+from xosc_lateral.extras.recordings.reconstruct import reconstruct_recording
+from xosc_lateral.extras.recordings.reconstruction import Reconstruction, drivers_table
+from xosc_lateral.extras.recordings.recordings import RecordedTraffic, read_recording
+from xosc_lateral.extras.recordings.settings import ReconstructSettings
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.recordings.importers import dlr_ht
-from xosc_lateral.workflows.recordings.reconstruct import reconstruct_recording
-from xosc_lateral.workflows.recordings.reconstruction import Reconstruction, drivers_table
-from xosc_lateral.workflows.recordings.recordings import RecordedTraffic, read_recording
-from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 
 FloatArray = NDArray[np.float64]

@@ -9,9 +9,9 @@ from msgspec.structs import replace
 from laboratory.rounding import rounded_effect, rounded_number
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.fitting.fitting import fit_profile
-from xosc_lateral.drivers.loop.close import LoopResult, close_loop
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
+from xosc_lateral.extras.loop.close import LoopResult, close_loop
 
 NAME = "motorway-refined"
 NOTES = (

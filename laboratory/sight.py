@@ -17,8 +17,8 @@ import numpy as np
 import xosc_lateral as xl
 from laboratory.detectors import recorded
 from laboratory.markers import show
-from xosc_lateral.workflows.detection.sight import Sight, moments_of
-from xosc_lateral.workflows.detection.tracks import LaneTrack, Scene
+from xosc_lateral.extras.detect.sight import Sight, moments_of
+from xosc_lateral.extras.detect.tracks import LaneTrack, Scene
 
 
 def moved(track: LaneTrack, offset: np.ndarray) -> LaneTrack:

@@ -18,7 +18,7 @@ import numpy as np
 import xosc_lateral as xl
 from tests.kit.compiled import CompiledDriver
 from tests.kit.stepped import stepped_offsets
-from xosc_lateral.workflows.live.c_numbers import inputs_of
+from xosc_lateral.extras.live.c_numbers import inputs_of
 
 STEP, SECONDS, AT = 0.05, 30.0, 15.0
 USUAL = {"lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}

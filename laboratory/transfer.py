@@ -29,11 +29,10 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.detection.band import keeping_spectrum
-from xosc_lateral.workflows.detection.call import seen_through
-from xosc_lateral.workflows.detection.detectors import Detector, LateralSpeed, TimeToLine, WanderingZone
-from xosc_lateral.workflows.detection.logistic import (
+from xosc_lateral.extras.detect.band import keeping_spectrum
+from xosc_lateral.extras.detect.call import seen_through
+from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, TimeToLine, WanderingZone
+from xosc_lateral.extras.detect.logistic import (
     ROW_STRIDE,
     Logistic,
     features,
@@ -41,14 +40,15 @@ from xosc_lateral.workflows.detection.logistic import (
     rows_to_train_on,
     train,
 )
-from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, Sensor, View, views_of
-from xosc_lateral.workflows.detection.scoring import Tally
-from xosc_lateral.workflows.detection.sources import SourceSettings, checked, sources_of
-from xosc_lateral.workflows.detection.tracks import STEP, Scene
-from xosc_lateral.workflows.detection.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
-from xosc_lateral.workflows.recordings.maneuvers import maneuvers_of
-from xosc_lateral.workflows.recordings.recorded import place_tracks
-from xosc_lateral.workflows.recordings.recordings import read_recording
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, views_of
+from xosc_lateral.extras.detect.scoring import Tally
+from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
+from xosc_lateral.extras.detect.tracks import STEP, Scene
+from xosc_lateral.extras.detect.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
+from xosc_lateral.extras.recordings.maneuvers import maneuvers_of
+from xosc_lateral.extras.recordings.recorded import place_tracks
+from xosc_lateral.extras.recordings.recordings import read_recording
+from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
 FloatArray = NDArray[np.float64]
 

@@ -25,15 +25,15 @@ from laboratory.reconstruction import WINDOW, write
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import slow_movement
+from xosc_lateral.extras.recordings.page import recorded_path
+from xosc_lateral.extras.recordings.reconstruct import STEP, in_lane_offsets, reconstruct_recording
+from xosc_lateral.extras.recordings.reconstruction import Reconstruction
+from xosc_lateral.extras.recordings.recordings import read_recording
+from xosc_lateral.extras.recordings.settings import ReconstructSettings
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.enrich import SegmentedRun, enrich
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.result import Enriched
-from xosc_lateral.workflows.recordings.page import recorded_path
-from xosc_lateral.workflows.recordings.reconstruct import STEP, in_lane_offsets, reconstruct_recording
-from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
-from xosc_lateral.workflows.recordings.recordings import read_recording
-from xosc_lateral.workflows.recordings.settings import ReconstructSettings
 from xosc_lateral.world.motion.gaps import Gap, gaps_of
 
 FloatArray = NDArray[np.float64]

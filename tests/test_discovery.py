@@ -12,9 +12,9 @@ import pytest
 
 import xosc_lateral.base.plugins as discovery
 from xosc_lateral.base.plugins import defined_in
-from xosc_lateral.drivers.loop.selection import TERMS
 from xosc_lateral.drivers.model import effects
 from xosc_lateral.drivers.model.effects import ColumnEffect, Effect, HiddenEffect
+from xosc_lateral.extras.loop.selection import TERMS
 
 NAME = "made_for_discovery"
 

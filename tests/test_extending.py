@@ -20,10 +20,10 @@ STEP = re.compile(
 )
 GUARDS = {
     "action": ["tests/world/player/test_documented.py", "tests/world/player/test_one_more.py"],
-    "detector": ["tests/workflows/detection/test_tuning.py"],
+    "detector": ["tests/extras/detect/test_tuning.py"],
     "effect": ["tests/drivers/model/effects/test_blocks.py", "tests/drivers/model/effects/test_column_effects.py",
-               "tests/workflows/live/test_c_driver.py::test_at_most_two_kinds_of_effects_are_missing_in_c",
-               "tests/workflows/live/test_c_driver.py::test_every_effect_that_a_profile_can_hold_acts_as_in_the_batch_call[motorway]"],
+               "tests/extras/live/test_c_driver.py::test_at_most_two_kinds_of_effects_are_missing_in_c",
+               "tests/extras/live/test_c_driver.py::test_every_effect_that_a_profile_can_hold_acts_as_in_the_batch_call[motorway]"],
     "importer": ["tests/files/test_one_more.py"],
     "setting": ["tests/workflows/test_options.py", "tests/workflows/conversion/test_settings.py"],
 }  # fmt: skip

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "xosc_lateral"
 
-RANKS = {"base": 0, "world": 1, "drivers": 1, "files": 2, "workflows": 3, "cli": 4}
+RANKS = {"base": 0, "world": 1, "drivers": 1, "files": 2, "workflows": 3, "cli": 4, "extras": 5}
 """Rank of each top folder; those of one rank do not know each other."""
 
 pytestmark = pytest.mark.lint
@@ -47,6 +48,16 @@ def test_imports_point_to_lower_ranks() -> None:
 def test_every_part_has_its_rank() -> None:
     parts = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
     assert parts - {"__init__", "__main__", "resources"} == set(RANKS)
+
+
+def test_extras_know_each_other_as_little_as_possible() -> None:
+    allowed = {"detect": {"recordings"}, "dossier": {"detect"}}
+    wrong = set()
+    for path in (PACKAGE / "extras").glob("*/**/*.py"):
+        own = path.relative_to(PACKAGE / "extras").parts[0]
+        met = set(re.findall(r"xosc_lateral\.extras\.(\w+)", path.read_text(encoding="utf-8")))
+        wrong |= {f"{path} imports {name}" for name in met - {own} - allowed.get(own, set())}
+    assert not wrong
 
 
 # ---- no circles between modules --------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ Everything listed in `__all__` is promised (`docs/api.md`) and loaded when it is
 
 from __future__ import annotations
 
+from xosc_lateral.base import extras as _extras
 from xosc_lateral.base.version import __version__
 
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
@@ -12,7 +13,6 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "workflows.conversion.convert",
     "convert_many": "workflows.batch.call",
-    "reconstruct": "workflows.recordings.reconstruct",
     "verify": "workflows.batch.verify",
     "reproduce": "workflows.batch.verify",
     "play": "workflows.playing.call",
@@ -20,13 +20,8 @@ _HOME = {
     "fit": "workflows.profiles.fit",
     "sample": "workflows.profiles.sample",
     "evaluate": "workflows.profiles.evaluate",
-    "close_loop": "workflows.profiles.loop",
-    "plan_loop": "workflows.profiles.loop",
-    "detect": "workflows.detection.call",
-    "dossier": "workflows.dossier.call",
     "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
-    "import_drives": "workflows.recordings.importers",
     "read_profile": "workflows.profiles.profiles",
     "write_profile": "workflows.profiles.profiles",
     "list_profiles": "workflows.profiles.profiles",
@@ -34,21 +29,11 @@ _HOME = {
     "list_templates": "workflows.playing.templates",
     "write_template": "workflows.playing.templates",
     "vary": "workflows.playing.vary",
-    "live_esmini": "workflows.live.call",
-    "live_sumo": "workflows.live.call",
-    "Traffic": "workflows.live.traffic",
-    "Moment": "workflows.live.traffic",
-    "EsminiTraffic": "workflows.live.esmini",
-    "SumoTraffic": "workflows.live.sumo",
-    "export_c": "workflows.live.c_driver",
-    "export_fmu": "workflows.live.fmu",
-    "LiveRun": "workflows.live.call",
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
     "Conversion": "workflows.conversion.conversion",
     "Variations": "workflows.playing.vary",
-    "Reconstruction": "workflows.recordings.reconstruction",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
     "Verification": "workflows.batch.verify",
@@ -56,13 +41,7 @@ _HOME = {
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
     "Evaluation": "workflows.profiles.evaluate",
-    "ClosedLoop": "workflows.profiles.loop",
-    "LoopPlan": "workflows.profiles.loop",
     "Health": "workflows.profiles.health",
-    "Detection": "workflows.detection.detection",
-    "Sight": "workflows.detection.sight",
-    "Dossier": "workflows.dossier.call",
-    "ImportedDrives": "workflows.recordings.importers",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
     "PlaybackError": "base.errors",
@@ -70,7 +49,8 @@ _HOME = {
     "NotEnoughDataError": "base.errors",
     "SimulationError": "base.errors",
 }
-"""Public name -> module that has it."""
+_HOME |= _extras.table("CALLS")
+"""Public name -> module that has it; calls of extras by their registry."""
 
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
@@ -147,33 +127,33 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.stream import OffsetStream
+    from xosc_lateral.extras.detect.call import detect
+    from xosc_lateral.extras.detect.detection import Detection
+    from xosc_lateral.extras.detect.sight import Sight
+    from xosc_lateral.extras.dossier.call import Dossier, dossier
+    from xosc_lateral.extras.live.c_driver import export_c
+    from xosc_lateral.extras.live.call import LiveRun, live_esmini, live_sumo
+    from xosc_lateral.extras.live.esmini import EsminiTraffic
+    from xosc_lateral.extras.live.fmu import export_fmu
+    from xosc_lateral.extras.live.sumo import SumoTraffic
+    from xosc_lateral.extras.live.traffic import Moment, Traffic
+    from xosc_lateral.extras.loop.call import ClosedLoop, LoopPlan, close_loop, plan_loop
+    from xosc_lateral.extras.recordings.importers import ImportedDrives, import_drives
+    from xosc_lateral.extras.recordings.reconstruct import reconstruct
+    from xosc_lateral.extras.recordings.reconstruction import Reconstruction
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
     from xosc_lateral.workflows.conversion.conversion import Conversion
     from xosc_lateral.workflows.conversion.convert import convert
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
-    from xosc_lateral.workflows.detection.call import detect
-    from xosc_lateral.workflows.detection.detection import Detection
-    from xosc_lateral.workflows.detection.sight import Sight
-    from xosc_lateral.workflows.dossier.call import Dossier, dossier
-    from xosc_lateral.workflows.live.c_driver import export_c
-    from xosc_lateral.workflows.live.call import LiveRun, live_esmini, live_sumo
-    from xosc_lateral.workflows.live.esmini import EsminiTraffic
-    from xosc_lateral.workflows.live.fmu import export_fmu
-    from xosc_lateral.workflows.live.sumo import SumoTraffic
-    from xosc_lateral.workflows.live.traffic import Moment, Traffic
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
     from xosc_lateral.workflows.playing.vary import Variations, vary
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check
-    from xosc_lateral.workflows.profiles.loop import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample
-    from xosc_lateral.workflows.recordings.importers import ImportedDrives, import_drives
-    from xosc_lateral.workflows.recordings.reconstruct import reconstruct
-    from xosc_lateral.workflows.recordings.reconstruction import Reconstruction
 
 
 def __getattr__(name: str) -> object:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral import convert, write_template
-from xosc_lateral.workflows.recordings.osi_trace import Trace
+from xosc_lateral.extras.recordings.osi_trace import Trace
 
 ALONG, ACROSS, REACH, MARGIN = 5.0, 20.0, 75.0, 16.0  # [px/m], [px/m], [m], [px]
 FONT = "font-family='sans-serif' font-size='12'"

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from scipy.fft import dct
 
-from xosc_lateral.drivers.loop.low_frequencies import SHORTEST_S, SPREAD_ORDERS
+from xosc_lateral.extras.loop.low_frequencies import SHORTEST_S, SPREAD_ORDERS
 from xosc_lateral.files.pages.chart import MUTED, ORANGE
 from xosc_lateral.files.pages.figure import Figure
 

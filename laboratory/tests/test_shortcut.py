@@ -7,7 +7,7 @@ import pytest
 
 from laboratory.shortcut import area, moments_of, told_before
 from tests.kit.lane_tracks import lane_change, scene, track, weave
-from xosc_lateral.workflows.detection.observation import PERFECT_SENSOR, views_of
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, views_of
 
 TIME = 0.1 * np.arange(1200)
 

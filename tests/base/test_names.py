@@ -21,10 +21,10 @@ from tests.kit.compiled import build
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.names import in_c, in_c_comment, in_csv, in_json, in_terminal, unwritable
 from xosc_lateral.drivers.model.effects import Acts, Linear
+from xosc_lateral.extras.live.c_driver import export_c
+from xosc_lateral.extras.live.fmu import export_fmu
 from xosc_lateral.files.output_tables import csv_text
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.workflows.live.c_driver import export_c
-from xosc_lateral.workflows.live.fmu import export_fmu
 
 PRINTABLE = [chr(sign) for sign in range(32, 127)]
 BIDIRECTIONAL = [chr(sign) for sign in (*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x200E, 0x200F, 0x061C)]

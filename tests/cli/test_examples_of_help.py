@@ -18,7 +18,7 @@ import pytest
 from examples.driver_simulator import simulate_drive
 from tests.kit.recordings import Case, road_file, sumo_files, write_mf4
 from xosc_lateral.cli import VERBS, main, verb
-from xosc_lateral.workflows.dossier import measures
+from xosc_lateral.extras.dossier import measures
 
 PROGRAM = "xosc-lateral "
 NEEDED = {
@@ -57,8 +57,8 @@ def drives(path: Path, seed: int, *, in_km_h: bool = False) -> None:
 
 
 def _dlr_wheel(path: Path) -> None:
-    from tests.workflows.recordings.test_dlr_ut import write_city
-    from tests.workflows.recordings.test_importers import _dlr_recording
+    from tests.extras.recordings.test_dlr_ut import write_city
+    from tests.extras.recordings.test_importers import _dlr_recording
 
     inner, folder = io.BytesIO(), "DLR-Highway-Traffic-dataset_v1-1-0"
     with zipfile.ZipFile(inner, "w") as archive:
@@ -72,14 +72,14 @@ def _dlr_wheel(path: Path) -> None:
 
 
 def _highd(path: Path) -> None:
-    from tests.workflows.recordings.test_importers import _highd as write
+    from tests.extras.recordings.test_importers import _highd as write
 
     path.mkdir()
     write(path, 0.4, -0.3)
 
 
 def _commonroad(path: Path) -> None:
-    from tests.workflows.recordings.test_importers_tracks import commonroad_scenario
+    from tests.extras.recordings.test_importers_tracks import commonroad_scenario
 
     commonroad_scenario(path.parent).rename(path)
 
@@ -130,7 +130,7 @@ def _smoothed(path: Path) -> None:
 
 
 def _openacc(path: Path) -> None:
-    from tests.workflows.recordings.test_openacc import platoon
+    from tests.extras.recordings.test_openacc import platoon
 
     platoon(path, phase=len(path.name))
 
@@ -152,8 +152,8 @@ def _batch(path: Path) -> None:
 
 def _with_changes(path: Path) -> None:
     """A profile that holds lane changes, too."""
-    from tests.workflows.recordings.test_importers_tracks import two_lanes_each_way
-    from tests.workflows.recordings.test_maneuvers import DURATIONS, changing
+    from tests.extras.recordings.test_importers_tracks import two_lanes_each_way
+    from tests.extras.recordings.test_maneuvers import DURATIONS, changing
 
     rows = [changing(k, one, left=k % 4 > 0, ahead=90.0) for k, one in enumerate(DURATIONS)]
     pd.concat(rows).to_csv("changes.csv", index=False)
@@ -222,7 +222,7 @@ def test_an_example_of_a_help_runs(line: str, tmp_path: Path, monkeypatch: pytes
         (tmp_path / PLAYER).touch()
         verb("live").commands["esmini"].make_context("esmini", words[2:])
         return
-    if words[0] == "dossier":  # one template, once: `tests/workflows/test_dossier.py` looks at what is measured
+    if words[0] == "dossier":  # one template, once: `tests/extras/dossier/test_dossier.py` looks at what is measured
         for name, few in (("TEMPLATES", ("cut-in",)), ("SEEDS", (1,)), ("DETECTED_VARIANTS", 1)):
             monkeypatch.setattr(measures, name, few)
     if words[:2] == ["live", "stdio"]:

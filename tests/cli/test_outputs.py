@@ -271,7 +271,7 @@ def test_every_verb_names_a_page_that_exists():
 
 
 def test_a_closed_loop_that_is_interrupted_says_what_it_was_at(capsys):
-    from xosc_lateral.cli.close_loop import shown_progress
+    from xosc_lateral.extras.loop.verb import shown_progress
 
     with pytest.raises(KeyboardInterrupt), shown_progress("closing the loop", False) as progress:
         progress(0.3, "looking at the mean")

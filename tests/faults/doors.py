@@ -19,11 +19,11 @@ from tests.kit.motion import two_roads
 from tests.kit.sumo_run import write_run
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.drivers.model.stream import sealed
+from xosc_lateral.extras.live.fmu import export_fmu
+from xosc_lateral.extras.live.stdio import Pipe
+from xosc_lateral.extras.live.sumo import SumoTraffic, start
+from xosc_lateral.extras.live.traffic import FORMAT, Moment, Traffic
 from xosc_lateral.files.profiles import read_profile
-from xosc_lateral.workflows.live.fmu import export_fmu
-from xosc_lateral.workflows.live.stdio import Pipe
-from xosc_lateral.workflows.live.sumo import SumoTraffic, start
-from xosc_lateral.workflows.live.traffic import FORMAT, Moment, Traffic
 
 SLOW = 20.0
 """A line that takes longer hangs a bench. [s]"""

@@ -23,9 +23,9 @@ from tests.kit.scenario_files import ROAD, declarations, entity, parameter, scen
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.limits import context_range
 from xosc_lateral.drivers.drives.drive import all_runs
-from xosc_lateral.drivers.loop.columns import Role
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.stream import OffsetStream
+from xosc_lateral.extras.loop.columns import Role
 from xosc_lateral.files.mapping import read_mapping
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.provenance import facts_in, without_provenance

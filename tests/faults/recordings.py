@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from tests.extras.recordings.test_importers_tracks import commonroad_scenario, driven, two_lanes_each_way
 from tests.faults.reader import Reader, sane_table
-from tests.workflows.recordings.test_importers_tracks import commonroad_scenario, driven, two_lanes_each_way
 
 
 def _levelx_files(folder: Path) -> Iterable[Path]:
-    from tests.workflows.recordings.test_importers import _exid, _highd
+    from tests.extras.recordings.test_importers import _exid, _highd
 
     _highd(folder, 0.4, -0.3)
     _exid(folder, True)
@@ -22,13 +22,13 @@ def _levelx_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_levelx(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.levelx import import_levelx
+    from xosc_lateral.extras.recordings.importers.levelx import import_levelx
 
     sane_table(import_levelx(path.with_name(f"{path.name.split('_')[0]}_tracks.csv")).table)
 
 
 def _dlr_files(folder: Path) -> Iterable[Path]:
-    from tests.workflows.recordings.test_importers import _dlr_recording
+    from tests.extras.recordings.test_importers import _dlr_recording
 
     tracks, _ = _dlr_recording(11, per_lane=14)
     tracks.to_csv(folder / "trajectories_1.csv", index=False, float_format="%.3f")
@@ -38,7 +38,7 @@ def _dlr_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_dlr(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.dlr_ht import import_dlr_ht
+    from xosc_lateral.extras.recordings.importers.dlr_ht import import_dlr_ht
 
     sane_table(import_dlr_ht(path).table)
 
@@ -60,7 +60,7 @@ def _mf4_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_mf4(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.mf4 import import_mf4
+    from xosc_lateral.extras.recordings.importers.mf4 import import_mf4
 
     sane_table(import_mf4(path, MF4_MAP).table)
 
@@ -75,7 +75,7 @@ def _tracks_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_tracks(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.tracks import import_tracks
+    from xosc_lateral.extras.recordings.importers.tracks import import_tracks
 
     source, road = path.with_name("tracks.csv"), path.with_name("road.xodr")
     sane_table(import_tracks(source, road=road, columns=("heading=psi:deg",)).table)
@@ -86,7 +86,7 @@ def _commonroad_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_commonroad(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.commonroad import import_commonroad
+    from xosc_lateral.extras.recordings.importers.commonroad import import_commonroad
 
     sane_table(import_commonroad(path).table)
 
@@ -98,7 +98,7 @@ def _osi_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_osi(path: Path) -> None:
-    from xosc_lateral.workflows.recordings.importers.osi import import_osi
+    from xosc_lateral.extras.recordings.importers.osi import import_osi
 
     sane_table(import_osi(path).table)
 

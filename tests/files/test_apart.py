@@ -19,9 +19,9 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import Limit
+from xosc_lateral.extras.recordings.formula import FormulaError, evaluate
 from xosc_lateral.files import apart as module
 from xosc_lateral.files.apart import apart
-from xosc_lateral.files.formula import FormulaError, evaluate
 from xosc_lateral.files.source import guarding_inputs, last_read, read_source, refuse_guarded
 from xosc_lateral.files.tables import read_table
 

@@ -9,8 +9,8 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.cli import main
+from xosc_lateral.extras.recordings import importers
 from xosc_lateral.files import output_tables
-from xosc_lateral.workflows.recordings import importers
 
 IMPORTER = '''
 """A log in centimetres."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lfilter
 
-from xosc_lateral.drivers.loop.timeline import PAD, Coarse, Timeline
+from xosc_lateral.extras.loop.timeline import PAD, Coarse, Timeline
 
 STEP = 0.2
 SPREAD = 0.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.workflows.detection.tracks import LaneTrack, Scene, tracks_of
+from xosc_lateral.extras.detect.tracks import LaneTrack, Scene, tracks_of
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 
 LANE, WIDTH, SPEED = 3.5, 1.9, 30.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from examples.driver_simulator.motorway import first_order
 from tests.kit.simulated.movements import ornstein_uhlenbeck, record_movement
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 from xosc_lateral.files.drives import drives_of_table
 
 FloatArray = NDArray[np.float64]

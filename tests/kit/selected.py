@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.loop.dictionary import Search
-from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.selection import ERROR_BUDGET, Selection, select
-from xosc_lateral.drivers.loop.timeline import Coarse, join_drives
+from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.identify import usable_columns
+from xosc_lateral.extras.loop.selection import ERROR_BUDGET, Selection, select
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 
 
 def selected(drives: Sequence[Drive], excluded: Sequence[str] = ()) -> Selection:

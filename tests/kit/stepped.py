@@ -8,7 +8,7 @@ import numpy as np
 
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.seeds import child
-from xosc_lateral.workflows.live.traffic import Moment, Traffic
+from xosc_lateral.extras.live.traffic import Moment, Traffic
 
 
 class Numbered(Traffic):

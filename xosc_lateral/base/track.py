@@ -20,6 +20,9 @@ Between = Literal["linear", "angle", "nearest", "across"]
 KNOWN: dict[str, Column[Any]] = {}
 """Columns that have an accessor, by name; any other is a context column: float64, NaN where there is nothing."""
 
+MAX_GAP = 0.5
+"""Missing rows up to this long are bridged; longer ones end a run. [s]"""
+
 
 class Column(Generic[Kind]):
     """A column of known meaning, and its accessor: `track.speed` is `track.columns["speed"]`, typed."""

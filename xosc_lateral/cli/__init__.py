@@ -14,6 +14,7 @@ from typing import Annotated, Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from xosc_lateral.base import extras
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.signals import Interrupted, raising_signals
@@ -22,7 +23,6 @@ from xosc_lateral.files.source import guarding_inputs
 
 VERBS = {
     "convert": "Make scenarios lifelike: one, several, a folder.",
-    "reconstruct": "Turn a recording into a maneuver-based scenario.",
     "verify": "Whether outputs are what would be made today.",
     "reproduce": "Make an output again from what it carries.",
     "view": "Play a scenario in the browser.",
@@ -32,21 +32,16 @@ VERBS = {
     "fit": "Fit a profile to measured drives.",
     "sample": "Sample offsets alone, as a table.",
     "evaluate": "Score a profile on measured drives.",
-    "detect": "Cut-in detectors on scenarios and real traffic.",
-    "close-loop": "Find and add what a profile lacks.",
-    "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",
-    "dossier": "Evidence for an assessor.",
     "template": "Scenarios to start from.",
     "vary": "A scenario's lane changes as long as real ones.",
-    "live": "Drivers in a simulation that runs.",
-    "export": "Drivers as parts for other tools.",
 }
-"""Name -> what it does."""
+VERBS |= {name: does for name, (_, does) in extras.table("VERBS").items()}
+"""Name -> what it does; those of extras behind those of the core."""
 
 VERB_MODULES = {
     "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
-    "view": "play", "segments": "play", "template": "play", "vary": "play", "import": "import_", "export": "live",
+    "view": "play", "segments": "play", "template": "play", "vary": "play",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
@@ -85,12 +80,18 @@ def group_of_verbs() -> typer.Typer:
     return group
 
 
+def home(name: str) -> str:
+    """Module of a verb."""
+    inside = VERB_MODULES.get(name, name.replace("-", "_"))
+    return f"xosc_lateral.{extras.table('VERBS').get(name, [f'cli.{inside}'])[0]}"
+
+
 @cache
 def verb(name: str) -> Any:
     """The command of a verb, its module loaded, and with the options of its call."""
     from xosc_lateral.cli.words import with_options
 
-    app = import_module(f"xosc_lateral.cli.{VERB_MODULES.get(name, name.replace('-', '_'))}").app
+    app = import_module(home(name)).app
     chosen = group_of_verbs()
     chosen.registered_commands = [info for info in app.registered_commands if info.name == name]
     chosen.registered_groups = [info for info in app.registered_groups if info.name == name]

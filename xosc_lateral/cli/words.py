@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hi
 
 import typer
 
+from xosc_lateral.base import extras
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
@@ -24,16 +25,10 @@ if TYPE_CHECKING:
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 DOCS_PAGES = {
-    "close_loop": "docs/closing_the_loop.md",
     "convert": "docs/scenarios.md, docs/pipeline.md",
-    "detect": "docs/how_to/detect.md",
-    "dossier": "docs/how_to/in_your_pipeline.md",
     "fit": "docs/model.md, docs/formats.md",
-    "import_": "docs/real_data.md, docs/formats.md",
-    "live": "docs/live.md",
     "play": "docs/playing.md",
     "profiles": "docs/library.md",
-    "reconstruct": "docs/how_to/from_a_recording.md",
 }
 """Module of verbs -> pages that say more."""
 
@@ -291,7 +286,7 @@ def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any 
     """Add a verb to a group, with examples and its page at the end of its help; `cli.verb` gives it its options."""
 
     def add(verb: Verb) -> Verb:
-        page = DOCS_PAGES[verb.__module__.rpartition(".")[2]]
+        page = (DOCS_PAGES | extras.table("PAGES"))[verb.__module__.removeprefix("xosc_lateral.").removeprefix("cli.")]
         lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
         epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
         group.command(name, cls=cls, short_help=short, epilog=epilog)(verb)

@@ -336,7 +336,7 @@ ENTRIES: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
 
 
 def _role(entry: Any, path: Path, where: str) -> str:
-    from xosc_lateral.drivers.loop.columns import Role
+    from xosc_lateral.drivers.drives.roles import Role
 
     if _text(entry, path, where) not in list(Role):
         raise FormatError(f"{entry!r} is none of {', '.join(Role)}", path=path, element=where)

@@ -74,7 +74,7 @@ class TwoLevelRefined(ProfileModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Fit the paper's model and close the loop on the same runs."""
-        from xosc_lateral.drivers.loop.close import close_loop
+        from xosc_lateral.extras.loop.close import close_loop
 
         base = fit_runs(runs, name="two-level", model=ModelKind.TWO_LEVEL)
         return cls(close_loop(drives_of(runs), base, seed=0, name="two-level-refined").refined)

@@ -7,8 +7,8 @@ import pytest
 
 from tests.kit.lane_tracks import LANE, lane_change, track
 from xosc_lateral.drivers.drives.drive import Drive, lane_change_rows
-from xosc_lateral.workflows.detection.tracks import truth_of
-from xosc_lateral.workflows.recordings.cuts import CutSettings, lane_changes
+from xosc_lateral.extras.detect.tracks import truth_of
+from xosc_lateral.extras.recordings.cuts import CutSettings, lane_changes
 
 STEP = 0.1
 TIME = STEP * np.arange(600)

@@ -14,8 +14,8 @@ from scipy.ndimage import gaussian_filter1d
 from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, cut_runs, lane_change_rows
 from xosc_lateral.drivers.drives.markings import Mended, both_markings
 from xosc_lateral.drivers.fitting.fitting import fit_profile
-from xosc_lateral.drivers.loop.identify import usable_columns
-from xosc_lateral.drivers.loop.timeline import join_drives
+from xosc_lateral.extras.loop.identify import usable_columns
+from xosc_lateral.extras.loop.timeline import join_drives
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.profiles import describe_profile
 

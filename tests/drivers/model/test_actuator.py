@@ -14,9 +14,9 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.model.actuator import drivable_step, fault_in_words, pay_off, stopping_speed
 from xosc_lateral.drivers.model.effects import Cycle, Step
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.extras.live.c_numbers import inputs_of
+from xosc_lateral.extras.live.traffic import Traffic
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.workflows.live.c_numbers import inputs_of
-from xosc_lateral.workflows.live.traffic import Traffic
 
 STEP = 0.05
 USUAL = {"speed": 33.0, "lane_width": 3.5, "lane_index": 1.0, "is_truck": 0.0}

@@ -195,7 +195,7 @@ def test_a_run_that_is_stopped_at_once_counts_what_was_there(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_any_other_verb_in_one_line(number: signal.Signals) -> None:
-    script = "import sys, xosc_lateral.workflows.live.stdio as s\nfrom xosc_lateral.cli import main\n"
+    script = "import sys, xosc_lateral.extras.live.stdio as s\nfrom xosc_lateral.cli import main\n"
     script += "s.Pipe.answers = lambda self, lines: iter([print('ready', flush=True), *lines])\nmain(None)\n"
     words = [sys.executable, "-c", script, "live", "stdio"]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}

@@ -22,8 +22,8 @@ from tests.workflows.conversion.test_vehicle_under_test import CHANGE, _of
 from tests.world.scenario.test_controllers import activation, object_controller
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.cli import main
+from xosc_lateral.extras.live.call import live_esmini
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.live.call import live_esmini
 
 LONGITUDINAL = {"longitudinal": "true", "lateral": "false"}
 BOTH = {"longitudinal": "true", "lateral": "true"}

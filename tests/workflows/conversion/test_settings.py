@@ -11,12 +11,12 @@ import pytest
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import verb
+from xosc_lateral.extras.recordings.settings import ReconstructKeywords, ReconstructSettings
 from xosc_lateral.files.configuration import SETTINGS
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertKeywords, ConvertSettings, OutputMode
 from xosc_lateral.workflows.options import SHARED, options_of
-from xosc_lateral.workflows.recordings.settings import ReconstructKeywords, ReconstructSettings
 
 
 def test_python_the_command_line_and_the_configuration_have_the_same_options() -> None:

@@ -11,8 +11,8 @@ from lxml import etree
 
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.extras.recordings.importers import import_drives
 from xosc_lateral.workflows.playing.templates import list_templates, write_template
-from xosc_lateral.workflows.recordings.importers import import_drives
 
 
 # ---- templates -------------------------------------------------------------------------------------------------------
@@ -83,7 +83,7 @@ def test_a_format_that_nobody_knows_and_a_source_of_nothing_are_refused(tmp_path
 
 def test_an_import_is_a_frame_a_record_and_a_file_of_the_same_drives(tmp_path: Path) -> None:
     """A plug-in's importer is any function of a path: here the table itself, moved 0.15 m to the left."""
-    from xosc_lateral.workflows.recordings.importers import as_imported
+    from xosc_lateral.extras.recordings.importers import as_imported
 
     source = tmp_path / "rows.csv"
     rows = pd.DataFrame({"time": [0.05 * k for k in range(400)], "offset": 0.15, "lane_width": 3.5, "speed": 30.0})

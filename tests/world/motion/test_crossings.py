@@ -13,11 +13,11 @@ from tests.kit.scenario_files import entity, private, scenario_text, speed_actio
 from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
 from tests.world.scenario.test_under_test import at, event, stories
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.extras.recordings.lateral import Rough, fit_transition
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import EntityResult, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.playing.figures import lane_changes_over_time
-from xosc_lateral.workflows.recordings.lateral import Rough, fit_transition
 from xosc_lateral.world.motion.segments import ALPHA, BETA, NINE_TENTHS, PEAK_SHARE, TENTH, bell_share
 
 WIDTH = 3.5

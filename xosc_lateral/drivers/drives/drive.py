@@ -12,6 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.track import MAX_GAP as MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import Course
 from xosc_lateral.drivers.drives.resampling import STEP, average, nearest, resample
 
@@ -144,8 +145,6 @@ LANE_JUMP_SHARE = 0.5
 HALF_WIDTH = 0.9
 """Half of a car's width: a centre nearer than this to a marking has a wheel on it. [m]"""
 
-MAX_GAP = 0.5
-"""Missing rows up to this long are bridged; longer ones end a run. [s]"""
 
 ON_GRID = 1e-6
 """Steps by which a row may miss an instant of the grid and still be at it: times are sums of steps. [-]"""

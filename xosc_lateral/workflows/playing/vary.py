@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
     from xosc_lateral.files.openscenario.write.draft import Draft
     from xosc_lateral.workflows.conversion.load import Played
-    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
     from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
+    from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 
 @declare_options
@@ -111,7 +111,7 @@ def _drawn(
 ) -> _Drawn:
     """Draw; the draft's lane changes refer to these parameters."""
     from xosc_lateral.files.openscenario.references import parameter_name
-    from xosc_lateral.workflows.recordings.lane_graph import RoadLanes
+    from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
     changes, lanes = _lane_changes(draft, played), RoadLanes(played.network)
     declarations = draft.root.find("{*}ParameterDeclarations")
@@ -201,7 +201,7 @@ def _weights(
     action: PlayedAction, vehicle: EntityMotion, row: int, played: Played, lanes: RoadLanes, maneuvers: Maneuvers
 ) -> FloatArray:
     """Of the profile's rows, by what the scenario's vehicle does in the row in which it begins to change lanes."""
-    from xosc_lateral.workflows.recordings.encounters import vehicle_ahead
+    from xosc_lateral.world.surroundings.lane_order import vehicle_ahead
 
     end = float(vehicle.time[-1]) if action.end is None else action.end
     width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))

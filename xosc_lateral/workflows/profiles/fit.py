@@ -123,11 +123,11 @@ def fit(
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
         profile = replace(profile, model=correct_two_level(profile.model), provenance=provenance)
     if maneuvers is not None:
+        from xosc_lateral.base.extras import service
         from xosc_lateral.files.source import parsed_hashes
-        from xosc_lateral.workflows.recordings.maneuvers import read_maneuvers
 
         recording = Path(maneuvers)
-        profile = replace(profile, maneuvers=read_maneuvers(recording, None if road is None else Path(road)))
+        profile = replace(profile, maneuvers=service("read_maneuvers")(recording, None if road is None else Path(road)))
         inputs = {**profile.provenance.inputs, **parsed_hashes([recording])}
         profile = replace(profile, provenance=replace(profile.provenance, inputs=inputs))
     return replace(profile, left_hand=left_hand)

@@ -44,11 +44,11 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     FormatError
         Only where there is no table at all: what is wrong with one is part of the result.
     """
-    from xosc_lateral.workflows.recordings.importers.foreign_table import mapping_text, recognised
+    from xosc_lateral.base.extras import service
 
     files, stated = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
-    seen, left = recognised([read_table(path, stated) for path in files], files[-1])
-    proposal = mapping_text(files, stated, seen, left)
+    seen, left = service("recognised")([read_table(path, stated) for path in files], files[-1])
+    proposal = service("mapping_text")(files, stated, seen, left)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))
     mappings = [stated, replace(guess, columns={**guess.columns, **stated.columns}, roles=stated.roles)]
     wrong, read = list[str](), None

@@ -16,12 +16,12 @@ from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import PAPER_RULES, all_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, simulate
-from xosc_lateral.drivers.loop.timeline import Timeline, join_drives, local_mean
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.linear_filters import worth_compiling
 from xosc_lateral.drivers.model.records import plain, read_as
+from xosc_lateral.extras.loop.timeline import Timeline, join_drives, local_mean
 
 
 def offsets(model: AutoregressiveModel, n: int, seed: int, start: Start | None = None) -> np.ndarray:

@@ -1,0 +1,182 @@
+"""Drives as units: what all change alike, what differs between them, and what nobody can tell from so few."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.kit.coarse import PAD, SPREAD, STEP, coarse_of, movement
+from xosc_lateral.extras.loop.columns import Column, Values
+from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, regress, slope_alike
+from xosc_lateral.extras.loop.model import Fitted, fit_model
+from xosc_lateral.extras.loop.selection import ERROR_BUDGET, select
+from xosc_lateral.extras.loop.shown import Shown, what_drives_show
+from xosc_lateral.extras.loop.terms.between import BetweenSpreadTerm, BetweenTerm, whole_drive_columns
+from xosc_lateral.extras.loop.terms.time import ALIKE, StepTerm, TimeMeanTerm, TimeSpreadTerm, mean_alike, spread_alike
+from xosc_lateral.extras.loop.timeline import Coarse
+
+SECONDS = 360.0
+N = round(SECONDS / STEP)
+SHARE = np.clip((np.arange(N) - PAD) / (N - 2 * PAD), 0.0, 1.0)
+"""Of a drive of five and a half minutes."""
+
+
+def drives(seed: int, shifts: np.ndarray, factors: np.ndarray, context: dict[str, np.ndarray] | None = None) -> Coarse:
+    """One drive per row of the shifts and of the factors on its movement, shape (drives, n)."""
+    rng = np.random.default_rng(seed)
+    parts = [shift + factor * movement(rng, SECONDS) for shift, factor in zip(shifts, factors, strict=True)]
+    return coarse_of(np.concatenate(parts), context, drives=len(parts))
+
+
+def search_of(coarse: Coarse, *names: str) -> Search:
+    columns = [Column(name, Values.NUMBER, False) for name in names]
+    return Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET)
+
+
+def test_a_slope_that_all_drives_have_is_tested_by_how_they_scatter() -> None:
+    """By hand: three slopes of equal weight, the prior worth four drives."""
+    coarse = drives(1, np.zeros((3, N)), np.ones((3, N)))
+    column = np.where(coarse.valid, np.random.default_rng(2).normal(size=len(coarse)), 0.0)
+    power = np.bincount(coarse.drive, column**2)
+    column /= np.sqrt(power)[coarse.drive]
+    slopes = np.array([1.0, 2.0, 3.0])
+    pooled = slope_alike(slopes[coarse.drive] * column, column, coarse, 2.0)
+    assert pooled is not None
+    error = np.sqrt((PRIOR_DRIVES * 2.0 + 2.0) / (PRIOR_DRIVES + 2.0) / 3.0)
+    assert (pooled.size, pooled.error) == (pytest.approx(2.0), pytest.approx(error))
+    assert pooled.p_value == pytest.approx(2.0 * stats.t.sf(2.0 / error, PRIOR_DRIVES + 2.0))
+
+
+def test_two_drives_do_not_say_whether_drives_change_alike() -> None:
+    fitted = fit_model(drives(3, np.zeros((2, N)), np.ones((2, N))), ())
+    assert mean_alike(fitted) is None
+    assert spread_alike(fitted) is None
+
+
+@pytest.mark.parametrize("seed", range(10, 14))
+def test_short_drives_on_which_nothing_acts_are_silent(seed: int) -> None:
+    coarse = drives(seed, np.zeros((5, N)), np.ones((5, N)))
+    search, fitted = search_of(coarse), fit_model(coarse, ())
+    for kind in (StepTerm, TimeSpreadTerm):
+        outcome = kind.test(search, fitted)
+        assert outcome is not None
+        assert outcome.p_value > 0.01
+
+
+def test_short_drives_that_drift_alike_have_a_mean_by_time() -> None:
+    coarse = drives(21, np.tile(0.3 * SHARE, (6, 1)), np.ones((6, N)))
+    (found,) = select(search_of(coarse)).accepted
+    assert isinstance(found.term, TimeMeanTerm)
+
+
+def growing(ways: list[float], seed: int) -> Coarse:
+    factors = np.stack([np.exp(way * (SHARE - 0.5)) for way in ways])
+    return drives(seed, np.zeros((len(ways), N)), factors)
+
+
+def test_short_drives_that_grow_restless_alike_have_a_spread_by_time() -> None:
+    coarse = growing([1.1] * 5, 22)
+    (found,) = select(search_of(coarse)).accepted
+    assert isinstance(found.term, TimeSpreadTerm)
+
+
+def test_drives_that_change_each_in_its_own_way_are_no_common_change() -> None:
+    """Both questions have an answer of their own."""
+    coarse = growing([1.6, -1.6, 1.5, -1.4, 1.6, -1.7], 23)
+    search, fitted = search_of(coarse), fit_model(coarse, ())
+    outcome, alike = TimeSpreadTerm.test(search, fitted), spread_alike(fitted)
+    assert outcome is not None and alike is not None
+    assert outcome.term is None
+    assert alike.within < ERROR_BUDGET["time_spread"]
+    assert alike.p_value > ALIKE
+    selected = select(search)
+    assert not [one for one in selected.accepted if isinstance(one.term, TimeSpreadTerm)]
+    (told,) = [one for one in selected.rejected if one.component == "time_spread"]
+    assert "each in its own way" in told.why
+
+
+def whole_drives(seed: int, number: int, shift: float, factor: float) -> tuple[Coarse, np.ndarray]:
+    """Passengers, 0 to 3, who shift the car and calm its driver."""
+    passengers = np.arange(number) % 4
+    levels = 0.03 * np.random.default_rng(seed).normal(size=number) + shift * passengers
+    shifts = np.repeat(levels[:, None], N, axis=1)
+    factors = np.repeat((factor**passengers)[:, None], N, axis=1)
+    column = np.repeat(passengers, N).astype(float)
+    return drives(seed, shifts, factors.astype(float), {"passengers": column}), passengers
+
+
+def test_a_column_of_one_value_a_drive_is_tested_on_mean_and_spread() -> None:
+    coarse, passengers = whole_drives(31, 12, 0.1, 0.7)
+    search, fitted = search_of(coarse, "passengers"), fit_model(coarse, ())
+    np.testing.assert_array_equal(whole_drive_columns(search)["passengers"], passengers)
+    mean, spread = (kind.test(search, fitted) for kind in (BetweenTerm, BetweenSpreadTerm))
+    assert mean is not None and spread is not None
+    assert mean.p_value < ERROR_BUDGET["between"]
+    assert spread.p_value < ERROR_BUDGET["between_spread"]
+    by = BetweenSpreadTerm.of(spread.term.effect)  # type: ignore[union-attr]
+    fitted = fit_model(coarse, (by,))
+    size = by.describe(fitted, by.estimate(fitted), "between_spread 0").size_m
+    assert size == pytest.approx(0.7**3, rel=0.25)
+
+
+def test_of_four_drives_nothing_between_them_can_be_told() -> None:
+    coarse, _ = whole_drives(32, 4, 0.3, 0.5)
+    search, fitted = search_of(coarse, "passengers"), fit_model(coarse, ())
+    assert BetweenTerm.test(search, fitted) is None
+    assert BetweenSpreadTerm.test(search, fitted) is None
+    told = [one for one in what_drives_show(search, fitted, {}) if one.what.startswith("passengers")]
+    assert [one.tested for one in told] == [False, False]
+    assert all("cannot be told" in one.why and "4 drives" in one.why for one in told)
+
+
+def test_the_regression_over_drives_is_honest_with_five_of_them() -> None:
+    rng, column = np.random.default_rng(33), np.array([0.0, 0.0, 1.0, 1.0, 1.0])
+    noise = np.array([0.01, 0.02, 0.01, 0.03, 0.02]) ** 2
+    p_values = []
+    for scatter in (0.0, 0.02, 0.1):
+        for _ in range(100):
+            values = rng.normal(size=5) * np.sqrt(noise + scatter**2)
+            p_values.append(regress(values, noise, column).p_value)
+    assert np.mean(np.array(p_values) < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 300)
+
+
+def shown(coarse: Coarse, fitted: Fitted | None = None, *, plan: bool = False) -> dict[tuple[str, str], Shown]:
+    search = search_of(coarse, "x")
+    looks = what_drives_show(search, fitted or fit_model(coarse, ()), {"clock": "why"}, plan=plan)
+    return {(one.what, one.acts): one for one in looks}
+
+
+def test_what_drives_can_show_is_stated_for_every_look() -> None:
+    rng = np.random.default_rng(34)
+    x = np.repeat(rng.normal(size=5 * N // 50), 50)
+    coarse = drives(35, np.zeros((5, N)), np.ones((5, N)), {"x": x})
+    looks, plan = shown(coarse), shown(coarse, plan=True)
+    assert {what for what, _ in looks} == {
+        *("clock", "x", "time", "step", "cycle", "regimes", "products of two columns"),
+    }
+    by_x = looks["x", "mean"]
+    assert by_x.smallest is not None and by_x.bound is not None
+    assert 0.0 < by_x.smallest < 3.0 * SPREAD
+    assert looks["x", "spread"].smallest is not None and looks["x", "spread"].smallest > 1.0  # type: ignore[operator]
+    assert looks["time", "mean"].tested and not looks["step", "mean"].tested and not looks["regimes", "spread"].tested
+    assert all(one.bound is None for one in plan.values())
+    assert plan["x", "mean"].smallest == by_x.smallest
+
+
+def test_an_effect_of_the_stated_size_is_found_in_most_and_of_a_third_in_few() -> None:
+    found = {1.0: 0, 0.33: 0}
+    for seed in range(40, 44):
+        rng = np.random.default_rng(seed)
+        x = np.repeat(rng.choice([0.0, 1.0], size=5 * N // 50), 50)
+        quiet = drives(seed, np.zeros((5, N)), np.ones((5, N)), {"x": x})
+        size = shown(quiet)["x", "mean"].smallest
+        assert size is not None
+        for share in found:
+            offset = quiet.timeline.offset + share * size * x
+            coarse = coarse_of(offset, {"x": x}, drives=5)
+            selected = select(search_of(coarse, "x"))
+            found[share] += any(one.term.columns == ("x",) for one in selected.accepted)
+    assert found[1.0] >= 2
+    assert found[0.33] <= 1

@@ -1,0 +1,191 @@
+"""A detector of the user's own: a program that reads what is seen and writes its alarms, a line of JSON per step."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from queue import Empty, Queue
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.extras.detect.detectors import RULES, Detector
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Measured, View, measure
+from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene
+
+ANSWER_TIME = 10.0
+"""An answer has to come within this; the first may take longer, while the program starts. [s]"""
+START_TIME = 60.0
+SIDES = {"left": 1, "right": -1}
+
+
+class Command(Detector):
+    """A program; it is started anew for every scene, so that nothing is left from another one."""
+
+    name = "command"
+    quantity = "score [-]"
+    CURVE = np.round(np.arange(0.0, 1.0, 0.02), 3)
+
+    def __init__(self, words: str, threshold: float = 0.5, answer_time: float = ANSWER_TIME) -> None:
+        try:
+            self.words = shlex.split(words)
+        except ValueError as error:
+            raise ValueError(f"{words!r}: {str(error).lower()}") from error
+        if not self.words:
+            raise ValueError("an empty command")
+        self.text, self.threshold, self._answer_time = words, threshold, answer_time
+
+    def label(self) -> str:
+        """See `Detector`."""
+        return self.text
+
+    def title(self) -> str:
+        """See `Detector`."""
+        return self.text
+
+    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
+        """See `Detector`."""
+        scores = [np.zeros(len(view.track)) for view in views]
+        if not views:
+            return scores
+        watched: dict[tuple[int, str], list[int]] = {}
+        for number, view in enumerate(views):
+            watched.setdefault((view.number, view.track.name), []).append(number)
+        with _started(self.words, scene.name) as talk:
+            for line, present in _steps(scene, views):
+                limit = START_TIME if line["time"] == present[0] else self._answer_time
+                answers = talk(line, limit)
+                for (_, name), numbers in watched.items():
+                    if name in answers:
+                        for number in numbers:
+                            view = views[number]
+                            row = present[1] - view.track.first
+                            if 0 <= row < len(view.track):
+                                scores[number][row] = _score(answers[name], view.side, name, line["time"], scene.name)
+        return scores
+
+
+def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any], tuple[float, int]]]:
+    """What is said at each instant, with the time of the first one and the instant's number."""
+    measured = {view.number: view.measured for view in views}
+    first = min(track.first for track in scene.tracks)
+    last = max(track.first + len(track) for track in scene.tracks)
+    rng = np.random.default_rng(0)  # the ego, say, knows itself: a sensor without errors draws nothing
+    known = [
+        _columns(track, measured.get(number) or measure(track, PERFECT_SENSOR, rng), scene)
+        for number, track in enumerate(scene.tracks)
+    ]
+    for instant in range(first, last):
+        vehicles = {
+            track.name: {name: values[instant - track.first] for name, values in columns.items()} | fixed
+            for track, (columns, fixed) in zip(scene.tracks, known, strict=True)
+            if track.first <= instant < track.first + len(track)
+        }
+        line = {"time": round(STEP * instant, 3), "ego": scene.ego, "vehicles": vehicles}
+        yield line, (round(STEP * first, 3), instant)
+
+
+def _columns(track: LaneTrack, measured: Measured, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+    """Values of a track that change, as lists, and those that don't; what is not known is left out."""
+    taken = measured.taken
+    values: dict[str, Any] = {
+        "offset": measured.offset, "lateral_speed": measured.speed, "lane_width": track.lane_width[taken],
+        "speed": track.speed[taken],
+    }  # fmt: skip
+    if "x" in track.columns:
+        values |= {"x": track.x[taken], "y": track.y[taken], "heading": track.heading[taken]}
+    columns: dict[str, list[Any]] = {name: np.round(one, 6).tolist() for name, one in values.items()}
+    if scene.network is not None and "road" in track.columns:
+        ids = scene.network.road_ids
+        columns["road"] = [ids[number] for number in track.road[taken].tolist()]
+        columns |= {"lane": track.lane[taken].tolist(), "s": np.round(track.s[taken], 3).tolist()}
+    if np.isnan(track.speed).any():
+        del columns["speed"]
+    size = {name: getattr(track.box, name) for name in ("length", "width", "center_x")}
+    return columns, {name: round(value, 3) for name, value in size.items()}
+
+
+def _score(answer: Any, side: int, name: str, time: float, scene: str) -> float:
+    """What is answered of a vehicle, from one side."""
+    value = answer.get("score") if isinstance(answer, dict) else None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise SimulationError(f"{scene}, {time:g} s: vehicle {name!r}: score is {json.dumps(value)}, expected a number")
+    stated_side = answer.get("side")
+    if stated_side is not None and stated_side not in SIDES:
+        raise SimulationError(
+            f"{scene}, {time:g} s: vehicle {name!r}: side is {json.dumps(stated_side)}, expected left or right"
+        )
+    return float(value) if stated_side is None or SIDES[stated_side] == side else 0.0
+
+
+@contextmanager
+def _started(words: Sequence[str], scene: str) -> Iterator[Callable[[dict[str, Any], float], dict[str, Any]]]:
+    """A running program, as a function from a line to the answer's vehicles."""
+    try:
+        program = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
+    except OSError as error:
+        known = ", ".join([*RULES, "logistic"])
+        what = f"detector {words[0]!r} can't be started: {str(error.strerror).lower()}; built in are {known}"
+        raise SimulationError(what) from error
+    lines: Queue[str | None] = Queue()
+    assert program.stdin is not None and program.stdout is not None
+    questions, output = program.stdin, program.stdout
+
+    def listen() -> None:
+        try:
+            for line in output:
+                lines.put(line)
+        except ValueError:  # closed, or no text
+            pass
+        lines.put(None)
+
+    listener = Thread(target=listen, daemon=True)
+    listener.start()
+
+    def talk(line: dict[str, Any], limit: float) -> dict[str, Any]:
+        where = f"{scene}, {line['time']:g} s: detector {words[0]!r}"
+        with suppress(OSError):  # where it has ended, its exit code is told below
+            questions.write(json.dumps(line) + "\n")
+            questions.flush()
+        try:
+            answer = lines.get(timeout=limit)
+        except Empty:
+            raise SimulationError(f"{where} did not answer within {limit:g} s") from None
+        if answer is None:
+            code = program.wait()
+            raise SimulationError(f"{where} ended with exit code {code} before it answered")
+        vehicles = _vehicles(answer, line["time"], where)
+        if unknown := vehicles.keys() - line["vehicles"].keys():
+            raise SimulationError(f"{where} answered for vehicle {min(unknown)!r}, which is not there")
+        return vehicles
+
+    try:
+        yield talk
+    finally:
+        program.kill()
+        program.wait()
+        listener.join(ANSWER_TIME)  # its children may still hold the pipe
+        for pipe in (questions, output):
+            with suppress(OSError):
+                pipe.close()
+
+
+def _vehicles(answer: str, time: float, where: str) -> dict[str, Any]:
+    """Vehicles that an answer names."""
+    shown = answer.strip()[:80]
+    try:
+        values = json.loads(answer)
+    except json.JSONDecodeError as error:
+        raise SimulationError(f"{where} answered {shown!r}: no JSON") from error
+    vehicles = values.get("vehicles") if isinstance(values, dict) else None
+    if not isinstance(vehicles, dict):
+        raise SimulationError(f"{where} answered {shown!r}: `vehicles` has to be an object by name")
+    if values.get("time", time) != time:
+        raise SimulationError(f"{where} answered for {values['time']!r} s")
+    return vehicles

@@ -1,0 +1,241 @@
+"""What detectors did on sources: counts, intervals, worst cases, as text, table, JSON and page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.texts import aligned
+from xosc_lateral.extras.detect.observation import Sensor
+from xosc_lateral.extras.detect.scoring import Case, Curve, Tally, worst_of
+from xosc_lateral.extras.detect.sources import Source
+from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
+from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
+
+if TYPE_CHECKING:
+    from xosc_lateral.files.pages.figure import Figure
+
+HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
+TUNED_HEADINGS = ("source", "detector", "set on", "threshold", *HEADINGS[2:])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Detection(Result):
+    """What detectors did on sources, in the order of the sources."""
+
+    tallies: Sequence[Tally]  # of every detector on every source
+    origins: Sequence[Source]
+    sensor: Sensor
+    seed: int
+    still: frozenset[str]  # sources in which no vehicle moves inside its lane
+    files: Sequence[Path]  # that must not be overwritten
+    goal: Goal | None = None  # what thresholds were set to; None: they are the detectors' own
+    homes: Sequence[Source] = ()  # on which they were set
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Their labels."""
+        return tuple(source.label for source in self.origins)
+
+    @cached_property
+    def curves(self) -> tuple[Curve, ...]:
+        """Of each tally."""
+        return tuple(tally.curve() for tally in self.tallies)
+
+    def headline(self) -> str:
+        """See `Result`."""
+        detectors = len({curve.detector.title() for curve in self.curves})
+        hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
+        what = f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+        return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
+
+    @property
+    def headings(self) -> tuple[str, ...]:
+        """Of the table."""
+        return HEADINGS if self.goal is None else TUNED_HEADINGS
+
+    def __str__(self) -> str:
+        lines = aligned([self.headings, *(cells(row) for row in self.rows())])
+        return "\n".join([self.headline(), "", *lines, "", *self.legend()])
+
+    def legend(self) -> Sequence[str]:
+        """What the numbers count, and what can't be read from them."""
+        lines = [
+            "False alarms: alarms that begin while a vehicle keeps its lane, an hour, seen from one neighbouring lane. "
+            "Seen: an alarm before the vehicle's reference point is in the other lane. Time: from the alarm to its "
+            "side on the marking, median. Intervals: 95 %, by vehicles drawn anew."
+        ]
+        if self.goal is not None:
+            lines.append(
+                f"Set on a home: the threshold that gives {self.goal.what} there; a source set on itself has, for each "
+                "vehicle, the threshold of other vehicles."
+            )
+            carriers = [detector for tally in self.tallies if isinstance(detector := tally.detector, Carried)]
+            if missed := not_met(carriers):
+                lines.append(f"No threshold gives that, the nearest is set: {', '.join(missed)}.")
+        silent = sorted(self.still)
+        if silent:
+            lines.append(
+                f"{', '.join(silent)}: no vehicle moves inside its lane, so that there are no false alarms by "
+                "construction: that says nothing about a detector."
+            )
+        alone = [curve for curve in self.curves if curve.detector.needs_observer and not len(curve.hours)]
+        left = sorted({f"{curve.detector.name} on {curve.source}" for curve in alone})
+        if left:
+            lines.append(f"Needs other vehicles, which are not there: {', '.join(left)}.")
+        return lines
+
+    def rows(self, *, every: bool = False) -> list[dict[str, Any]]:
+        """A row for each source and detector at the threshold that is set, or at every threshold."""
+        return [
+            row
+            for curve in self.curves
+            for row in _rows(curve, range(len(curve.rate)) if every else [curve.detector.chosen])
+        ]
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per source, detector and threshold; `is_set` marks the one that is set. [1/h], [s], shares."""
+        return pd.DataFrame(self.rows(every=True))
+
+    def worst(self) -> list[tuple[str, str, Case]]:
+        """Source, detector and case of the worst ones of all."""
+        return worst_of(
+            [(tally.source, tally.detector.label(), case) for tally in self.tallies for case in tally.cases]
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "sources": [{"label": each.label, "files": [path.name for path in each.files]} for each in self.origins],
+            "sensor": {"noise": self.sensor.noise, "delay": self.sensor.delay, "rate": self.sensor.rate},
+            **({} if self.goal is None else {
+                "goal": self.goal.text,
+                "homes": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.homes],
+            }),
+            "rows": [_plain(row) for row in self.rows()],
+            "curves": [
+                {
+                    "source": curve.source,
+                    "detector": curve.detector.label(),
+                    "quantity": curve.detector.quantity,
+                    "threshold": curve.detector.thresholds.tolist(),
+                    "false_alarms_per_hour": _listed(curve.rate),
+                    "seen": _listed(curve.seen),
+                    "seen_before_marking": _listed(curve.in_time),
+                    "median_lead_s": _listed(curve.lead(0.5)),
+                }
+                for curve in self.curves
+            ],
+            "worst": [
+                {"kind": case.kind, "source": source, "detector": detector, "scene": case.scene.name,
+                 "vehicle": case.view.track.name, "side": "left" if case.view.side > 0 else "right",
+                 "time": round(case.time, 3)}
+                for source, detector, case in self.worst()
+            ],
+            "provenance": self.provenance(),
+        }  # fmt: skip
+
+    def provenance(self) -> dict[str, Any]:
+        """Seed and hashes of all inputs."""
+        files = [path for source in (*self.origins, *self.homes) for path in source.files if path.is_file()]
+        return {"seed": self.seed, "inputs": parsed_hashes(files)}
+
+    def plot(self) -> Figure:
+        """Cut-ins seen in time, and the median time before the marking, over false alarms an hour."""
+        from xosc_lateral.extras.detect.page import curves_figure
+
+        return curves_figure(self.curves)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table with every threshold: ``.csv``, ``.csv.gz`` or ``.parquet``."""
+        return write_table(path, "detection.csv", self.to_frame, self.provenance, inputs=self.files, force=force)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page: table, curves, and the worst cases in the player."""
+        from xosc_lateral.extras.detect.page import detection_page
+
+        html = partial(
+            detection_page,
+            lead=[f"{self.headline()}.", *self.legend()],
+            table=[dict(zip(self.headings, cells(row), strict=True)) for row in self.rows()],
+            curves=self.curves,
+            worst=self.worst(),
+            provenance=self.provenance(),
+        )
+        return write_page(path, "detection.html", html, inputs=self.files, force=force)
+
+
+def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
+    detector, rates, seen = curve.detector, curve.rate_interval(), curve.seen_interval()
+    in_time, medians = curve.seen_interval(in_time=True), curve.lead_interval()
+    low, middle, high = (curve.lead(share) for share in (0.05, 0.5, 0.95))
+    fixed: dict[str, Any] = {"source": curve.source, "detector": detector.label()}
+    if isinstance(detector, Carried):
+        home = detector.home
+        fixed |= {
+            "detector": detector.title(), "home": home.source, "home_met": home.met,
+            "home_false_alarms_per_hour": home.rate, "home_seen_before_marking": home.seen,
+        }  # fmt: skip
+    counts = {"vehicles": len(curve.hours), "hours": float(curve.hours.sum()), "cut_ins": len(curve.leads)}
+    rows = []
+    for k in numbers:
+        is_set = k == detector.chosen
+        rows.append({
+            **fixed, "threshold": float(detector.thresholds[k]), "is_set": is_set, **counts,
+            "false_alarms": int(curve.counts[:, k].sum()),
+            "false_alarms_per_hour": float(curve.rate[k]),
+            "false_alarms_low": float(rates[0, k]), "false_alarms_high": float(rates[1, k]),
+            "seen": float(curve.seen[k]), "seen_low": float(seen[0, k]), "seen_high": float(seen[1, k]),
+            "seen_before_marking": float(curve.in_time[k]),
+            "seen_before_marking_low": float(in_time[0, k]), "seen_before_marking_high": float(in_time[1, k]),
+            "lead_median": float(middle[k]), "lead_5": float(low[k]), "lead_95": float(high[k]),
+            "lead_median_low": medians[0] if is_set else np.nan,
+            "lead_median_high": medians[1] if is_set else np.nan,
+        })  # fmt: skip
+    return rows
+
+
+def _listed(values: Any) -> list[float | None]:
+    return [None if np.isnan(value) else round(float(value), 6) for value in values]
+
+
+def _plain(row: dict[str, Any]) -> dict[str, Any]:
+    """NaN as None, numbers rounded."""
+    return {
+        name: (None if np.isnan(value) else round(value, 6)) if isinstance(value, float) else value
+        for name, value in row.items()
+    }
+
+
+# ---- cells of the table ----
+def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Cells of a row, as texts; intervals of 95 %."""
+    alarms = _with_interval(row, "false_alarms_per_hour", "false_alarms_low", "false_alarms_high", 1)
+    seen = _share(row, "seen", "seen_low", "seen_high")
+    in_time = _share(row, "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high")
+    lead = _with_interval(row, "lead_median", "lead_median_low", "lead_median_high", 2)
+    home = (str(row["home"]), f"{row['threshold']:.3g}") if "home" in row else ()
+    return str(row["source"]), str(row["detector"]), *home, alarms, seen, in_time, lead
+
+
+def _share(row: Mapping[str, Any], name: str, low: str, high: str) -> str:
+    """Percent of the cut-ins; none where there are none."""
+    if not row["cut_ins"]:
+        return "no cut-in"
+    percent = {key: 100.0 * row[key] for key in (name, low, high)}
+    return _with_interval(percent, name, low, high, 0, " %")
+
+
+def _with_interval(row: Mapping[str, Any], name: str, low: str, high: str, digits: int, unit: str = "") -> str:
+    value, ends = row[name], (row[low], row[high])
+    if np.isnan(value):
+        return "-"
+    between = "" if np.isnan(ends).any() else f" ({ends[0]:.{digits}f} to {ends[1]:.{digits}f})"
+    return f"{value:.{digits}f}{unit}{between}"

@@ -1,0 +1,280 @@
+"""Thresholds set at home, where a developer has truth, and carried to other traffic, which had no part in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector
+from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
+from xosc_lateral.extras.detect.tracks import Scene
+
+Views: TypeAlias = Sequence[tuple[Scene, Sequence[View]]]
+"""Scenes, each with what is seen in it."""
+Learner: TypeAlias = Callable[[Iterable[View], str], Detector]
+"""Trains a detector on views of a source, which it may name in errors."""
+
+FOLDS = 5
+"""Of a home's vehicles: a trained detector scores those of one fold as trained on the others. The usual number, or that
+of the vehicles that change lanes: every fold needs one."""
+GRID = 1000
+"""Thresholds tried at home, of the score's peaks in lane keeping by rank: the highest each, then 1.4 % apart in rank at
+a million peaks, so that rates are met within as much. An evenly spaced grid misses rates by factors."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a threshold is set to at home: at most so many false alarms an hour, or at least such a share seen."""
+
+    text: str
+    rate: float | None = None  # [1/h]
+    share: float | None = None  # of cut-ins, before the marking
+
+    @property
+    def what(self) -> str:
+        """In words."""
+        if self.rate is not None:
+            return f"at most {self.rate:g} false alarms an hour"
+        return f"the fewest false alarms with {self.text} of the cut-ins seen before the marking"
+
+    def number(self, curve: Curve) -> tuple[int, bool]:
+        """Of the threshold that meets it, and whether it does: else the one nearest to it."""
+        if self.rate is not None:
+            k = curve.tuned(self.rate)
+            return k, bool(curve.sensitive_rate()[k] <= self.rate)
+        assert self.share is not None
+        k = curve.seeing(self.share)
+        return k, bool(curve.in_time[k] >= self.share)
+
+
+def read_goal(text: str) -> Goal:
+    """A goal from ``20/h`` or ``95%``; raises `ValueError`."""
+    match = re.fullmatch(r"(\d+\.?\d*)\s*(/\s*h|%)", text.strip())
+    value = float(match[1]) if match else 0.0
+    if match is None or value <= 0.0 or (match[2] == "%" and value > 100.0):
+        raise ValueError(f"{text!r}: expected false alarms an hour as in 20/h, or cut-ins seen as in 95%")
+    return Goal(text.strip(), share=0.01 * value) if match[2] == "%" else Goal(text.strip(), rate=value)
+
+
+@dataclass(frozen=True, eq=False)
+class Home:
+    """Where a threshold was set, and what the detector does there: on vehicles that it was not trained on."""
+
+    source: str
+    goal: Goal
+    met: bool
+    rate: float  # false alarms an hour
+    seen: float  # share of cut-ins before the marking; NaN: there are none
+    is_source: bool = False  # tried on the source itself: each vehicle's threshold comes from other vehicles
+
+
+class Carried(Detector):
+    """A detector with a threshold from home."""
+
+    def __init__(self, detector: Detector, limit: float, home: Home) -> None:
+        self.detector, self.home = detector, home
+        self.needs_observer, self.growing = detector.needs_observer, detector.growing  # type: ignore[misc]
+        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
+        self.home_source = home.source
+        self.threshold = detector.threshold_of(limit)
+        known_limits = np.array([]) if home.is_source else detector.limits
+        self._limits = np.unique(np.append(known_limits, limit))
+        self._chosen = int(np.searchsorted(self._limits, limit))
+
+    @property
+    def limits(self) -> FloatArray:
+        """See `Detector`."""
+        return self._limits
+
+    @property
+    def thresholds(self) -> FloatArray:
+        """See `Detector`."""
+        return np.array([self.detector.threshold_of(limit) for limit in self._limits])
+
+    @property
+    def chosen(self) -> int:
+        """See `Detector`."""
+        return self._chosen
+
+    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
+        """See `Detector`."""
+        return self.detector.scores(scene, views)
+
+    def label(self) -> str:
+        """See `Detector`."""
+        return f"{self.detector.title()}, set on {self.home.source}"
+
+    def title(self) -> str:
+        """See `Detector`."""
+        return self.detector.title()
+
+
+class AtLimits(Detector):
+    """A detector at some limits alone, increasing."""
+
+    def __init__(self, detector: Detector, limits: FloatArray) -> None:
+        self.detector, self._limits = detector, limits
+        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
+
+    @property
+    def limits(self) -> FloatArray:
+        """See `Detector`."""
+        return self._limits
+
+    @property
+    def chosen(self) -> int:
+        """See `Detector`."""
+        return 0
+
+    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
+        """See `Detector`."""
+        return self.detector.scores(scene, views)
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A view with its score, shape (n,)."""
+
+    scene: Scene
+    view: View
+    score: FloatArray
+
+
+def scored(detector: Detector, views: Views) -> list[Scored]:
+    """Every view that the detector can score."""
+    scored_views = []
+    for scene, several in views:
+        usable = detector.usable(several)
+        scores = detector.scores(scene, usable)
+        scored_views += [Scored(scene, *each) for each in zip(usable, scores, strict=True)]
+    return scored_views
+
+
+def set_at_home(
+    goal: Goal, detector: Detector | Learner, views: Views, source: str, *, within: bool = False
+) -> tuple[Carried, Tally | None]:
+    """The detector with its threshold from home; `within`: also what it does at home itself."""
+    if isinstance(detector, Detector):
+        trained, at_home = detector, scored(detector, views)
+    else:
+        trained, at_home = out_of_fold(detector, views, source)
+    within_source = carried_within(goal, trained, at_home, source) if within else None
+    return carried(goal, trained, at_home, source), within_source
+
+
+def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
+    """By detector in the order in which it comes first, then by home."""
+    titles = list(dict.fromkeys(tally.detector.title() for tally in tallies))
+    order = ["", *homes]
+    return sorted(
+        tallies,
+        key=lambda each: (titles.index(each.detector.title()), order.index(each.detector.home_source)),
+    )
+
+
+def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, list[Scored]]:
+    """The detector trained on all, and scores of each vehicle by one that was trained on others alone.
+
+    Raises `NotEnoughDataError` where fewer than two vehicles change lanes.
+    """
+    folds = folds_of([view for _, several in views for view in several], source, every_changes=True)
+    scored_views: list[Scored] = []
+    for fold in sorted(set(folds.values())):
+        trained = learner(_outside(views, folds, fold), source)
+        held = [(scene, [view for view in several if folds[view.track.cluster] == fold]) for scene, several in views]
+        scored_views += scored(trained, [(scene, several) for scene, several in held if several])
+    return learner((view for _, several in views for view in several), source), scored_views
+
+
+def _outside(views: Views, folds: Mapping[str, int], fold: int) -> Iterable[View]:
+    return (view for _, several in views for view in several if folds[view.track.cluster] != fold)
+
+
+def folds_of(views: Sequence[View], source: str, *, every_changes: bool) -> dict[str, int]:
+    """Vehicle -> fold; those that change lanes are dealt out by themselves, so that each fold has its share."""
+    changing = sorted({view.track.cluster for view in views if cut_ins_of(view)})
+    rest = sorted({view.track.cluster for view in views} - set(changing))
+    count = min(FOLDS, len(changing) if every_changes else len(changing) + len(rest))
+    if count < 2:
+        what = f"{len(changing)} vehicle(s) of {len(changing) + len(rest)} change lanes"
+        wanted = "that change lanes" if every_changes else "at all"
+        raise NotEnoughDataError(
+            f"{source}: {what}; so that no vehicle has a part in its own threshold, there have to be 2 {wanted}"
+        )
+    return {cluster: number % count for each in (changing, rest) for number, cluster in enumerate(each)}
+
+
+def carried(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Carried:
+    """The detector with the threshold that meets the goal in these views."""
+    curve = _curve(detector, at_home, source)
+    if not len(curve.hours) or not curve.hours.sum():
+        raise NotEnoughDataError(f"{source}: no lane keeping that {detector.name} can be set on")
+    if goal.share is not None and not len(curve.leads):
+        raise NotEnoughDataError(f"{source}: no cut-in, so that no threshold sees {goal.text} of them")
+    k, met = goal.number(curve)
+    home = Home(source, goal, met, float(curve.rate[k]), float(curve.in_time[k]))
+    return Carried(detector, float(curve.detector.limits[k]), home)
+
+
+def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Tally:
+    """What the detector does at home itself: in each fold of vehicles with the threshold that the others give."""
+    folds = folds_of([each.view for each in at_home], source, every_changes=goal.share is not None)
+    parts = []
+    for fold in sorted(set(folds.values())):
+        others = [each for each in at_home if folds[each.view.track.cluster] != fold]
+        carrier = carried(goal, detector, others, source)
+        tally = Tally(
+            Carried(detector, float(carrier.limits[carrier.chosen]), replace(carrier.home, is_source=True)), source
+        )
+        for each in at_home:
+            if folds[each.view.track.cluster] == fold:
+                tally.count(each.scene, each.view, each.score)
+        parts.append(tally)
+    every = carried(goal, detector, at_home, source)
+    whole = Tally(Carried(detector, float(every.limits[every.chosen]), replace(every.home, is_source=True)), source)
+    for part in parts:
+        whole.seconds |= part.seconds
+        whole.counts |= part.counts
+        whole.change_clusters += part.change_clusters
+        whole.leads += part.leads
+        whole.cases += part.cases
+    return whole
+
+
+def _curve(detector: Detector, at_home: Sequence[Scored], source: str) -> Curve:
+    tally = Tally(AtLimits(detector, _grid(detector, at_home)), source)
+    for each in at_home:
+        tally.count(each.scene, each.view, each.score)
+    return tally.curve()
+
+
+def _grid(detector: Detector, at_home: Sequence[Scored]) -> FloatArray:
+    """Scores at which counts change, none below the most sensitive threshold of the detector's own curve.
+
+    Where nothing moves no threshold alarms, and only that one stands for what a developer would take.
+    """
+    peaks, reached = [], []
+    for each in at_home:
+        score = np.where(each.view.watched, each.score, NO_DANGER)
+        keeping = each.view.truth.keeping & each.view.watched
+        higher = score[1:-1] >= np.maximum(score[:-2], score[2:])
+        peaks.append(score[1:-1][higher & keeping[1:-1]])
+        reached += [float(score[c.begin : max(c.crossing, c.begin + 1)].max()) for c in cut_ins_of(each.view)]
+    ordered = np.sort(np.concatenate([*peaks, detector.limits[:1]]))[::-1]
+    ranks = np.unique(np.round(np.geomspace(1, len(ordered), GRID)).astype(np.int64)) - 1
+    below = np.nextafter(np.array(reached), -np.inf)  # alarms are above a limit
+    every = np.unique(np.concatenate([ordered[ranks], below, detector.limits]))
+    return np.asarray(every[every >= detector.limits[0]])
+
+
+def not_met(carriers: Collection[Carried]) -> list[str]:
+    """Detectors and homes at which no threshold meets the goal, in words."""
+    missed = [(one.title(), one.home) for one in carriers if not one.home.met]
+    return sorted({f"{title} on {home.source} ({home.rate:.1f}/h, {home.seen:.0%} seen)" for title, home in missed})

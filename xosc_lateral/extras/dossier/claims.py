@@ -1,0 +1,147 @@
+"""Claims, and what becomes of them: they hold, are broken, are stated by others, or nobody tests them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Iterable, Mapping
+from enum import StrEnum
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.plugins import shipped_folder
+from xosc_lateral.files.source import read_toml
+
+
+class Claim(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is said of a profile or folder; `measure`: which figure shows it, within `at_least` and `at_most`."""
+
+    id: str
+    words: str
+    about: Literal["profile", "folder", "any"] = "any"
+    measure: str = ""
+    unit: str = ""
+    at_least: float | None = None
+    at_most: float | None = None
+    test: str = ""
+
+    @property
+    def bound(self) -> str:
+        """In words."""
+        ends = (("at least", self.at_least), ("at most", self.at_most))
+        return ", ".join(f"{word} {value:g}" for word, value in ends if value is not None)
+
+    def allows(self, value: float) -> bool:
+        """Whether a figure is what it says; NaN never is."""
+        low = -float("inf") if self.at_least is None else self.at_least
+        return low <= value <= (float("inf") if self.at_most is None else self.at_most)
+
+
+class Contents(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a dossier says; `clauses`: part -> what it answers; `tool`: uses, what can go wrong, and what finds it;
+    `process`: what else an assessor asks for, and the answer."""
+
+    purpose: str = ""
+    clauses: dict[str, list[str]] = {}
+    claim: list[Claim] = []
+    tool: list[dict[str, str]] = []
+    process: list[dict[str, str]] = []
+
+
+class State(StrEnum):
+    """What is known of a claim."""
+
+    HOLDS = "computed here and within bounds"
+    BROKEN = "broken"
+    STATED = "stated, not computed here"
+    UNTESTED = "without a test"
+
+
+class Finding(msgspec.Struct, frozen=True):
+    """A claim, its figure and where that comes from."""
+
+    claim: Claim
+    state: State
+    value: float | None = None
+    origin: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        value = None if self.value is None else round(self.value, 9)
+        return {
+            **msgspec.to_builtins(self.claim),
+            "state": self.state.name.lower(),
+            "value": value,
+            "origin": self.origin,
+        }
+
+
+Measure = Callable[[Any], float | None]
+"""A figure of a profile's or folder's bench; None: what it needs is not given."""
+
+
+def contents_of(path: Path | None) -> Contents:
+    """What ships, and claims of the user's own file, which replace those of the same id. Raises `FormatError`."""
+    shipped = Path(str(files("xosc_lateral.extras.dossier") / "dossier.toml"))
+    contents = _read(shipped)
+    if path is None:
+        return contents
+    users = _read(path)
+    claims = {claim.id: claim for claim in (*contents.claim, *users.claim)}
+    return Contents(users.purpose or contents.purpose, contents.clauses | users.clauses, [*claims.values()],
+                    [*contents.tool, *users.tool])  # fmt: skip
+
+
+def _read(path: Path) -> Contents:
+    try:
+        return msgspec.convert(read_toml(path, "not a file of claims"), Contents)
+    except msgspec.ValidationError as error:
+        raise FormatError(f"not a file of claims: {error}", path=path) from error
+
+
+def known_anomalies() -> list[str]:
+    """Limitations as the documentation has them, without its links."""
+    text = (shipped_folder("docs") / "limitations.md").read_text(encoding="utf-8")
+    points = [" ".join(point.split()) for point in text.split("\n- ")[1:]]
+    return [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", point).replace("**", "") for point in points]
+
+
+def judged(
+    claims: Iterable[Claim],
+    measures: Mapping[str, Measure],
+    bench: object,
+    stated: Mapping[str, float],
+    computed: Container[str],
+) -> list[Finding]:
+    """Each claim with its figure: on the bench where its measure is to be `computed`, else as `stated` by measure.
+
+    Raises `FormatError`: a measure that nobody knows.
+    """
+    findings = []
+    for claim in claims:
+        measure = measures.get(claim.measure)
+        if claim.measure and measure is None:
+            raise FormatError(
+                f"no measure {claim.measure!r}; there are {', '.join(measures)}", element=f"claim {claim.id!r}"
+            )
+        value = measure(bench) if measure is not None and claim.measure in computed else None
+        state, origin = State.HOLDS, "computed here"
+        if value is None:
+            value = stated.get(claim.measure)
+            state = State.STATED if measure is not None else State.UNTESTED
+            origin = "" if value is None else "stated by the profile, from drives that it was not fitted to"
+            if value is None and measure is not None:
+                origin = "its drives are needed: --data" if claim.measure in computed else "not computed: --recompute"
+        if value is not None and not claim.allows(value):
+            state = State.BROKEN
+        findings.append(Finding(claim, state, value, origin))
+    return findings
+
+
+def summary_of(findings: Iterable[Finding]) -> str:
+    """How many claims of which state."""
+    states = [finding.state for finding in findings]
+    return "; ".join(f"{states.count(state)} {state.value}" for state in State if state in states)

@@ -1,0 +1,71 @@
+"""The dossier as a page: each part with the clauses that it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from xosc_lateral.extras.dossier.claims import Contents, Finding, State, known_anomalies, summary_of
+from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone, inline
+
+TITLES = {
+    "validity": "Validity by frequency, speed, lane width, road",
+    "data": "Data, licence, uncertainty",
+    "verdict": "How much a verdict may change",
+}
+"""Parts that are tables of two columns."""
+
+_COLOURS = {State.HOLDS: "#1a7f37", State.BROKEN: "#c62828", State.STATED: "#8a6d00", State.UNTESTED: "#8a6d00"}
+
+
+def dossier_page(
+    subject: str,
+    contents: Contents,
+    findings: Sequence[Finding],
+    parts: Mapping[str, Sequence[tuple[str, str]]],
+    versions: Mapping[str, str],
+) -> str:
+    """HTML; equal values, equal bytes. `parts`: what is known besides the claims, by part."""
+    page = Page(f"Dossier: {subject}")
+    page.lead(f"{len(findings)} claims: {summary_of(findings)}.")
+    counts = {state: sum(finding.state is state for finding in findings) for state in State}
+    tones: dict[State, Tone] = {State.BROKEN: "bad"} if counts[State.BROKEN] else {State.HOLDS: "good"}
+    page.key_figures(KeyFigure(count, str(state), tone=tones.get(state, "")) for state, count in counts.items())
+    for finding in findings:
+        if finding.state is State.BROKEN:
+            page.warning(f"Broken claim: {finding.claim.words}")
+
+    def begin(part: str, title: str) -> None:
+        page.section(title, f"Answers: {'; '.join(contents.clauses.get(part, ['no clause']))}.")
+
+    begin("purpose", "Purpose and scope")
+    page.text(contents.purpose)
+    begin("claims", "Claims, and what shows them")
+    page.table([_claim_row(finding) for finding in findings])
+    for part, title in TITLES.items():
+        begin(part, title)
+        page.table([{"": name, "what is known": words} for name, words in parts[part]])
+    begin("anomalies", "Known anomalies")
+    page.items(known_anomalies())
+    begin("tool", "Tool classification, as proposed")
+    page.text(
+        "Impact, detection and confidence level follow from your own use: those below hold where the check that is "
+        "named is part of it, and its result is looked at."
+    )
+    page.table(contents.tool)
+    begin("process", "Documentation, process and people")
+    page.table(contents.process)
+    begin("versions", "Versions and hashes")
+    page.table([{"": name, "version": words} for name, words in versions.items()])
+    return page.html({"subject": subject, "versions": dict(versions)})
+
+
+def _claim_row(finding: Finding) -> dict[str, object]:
+    claim, value = finding.claim, finding.value
+    return {
+        "claim": claim.words,
+        "state": Html(f'<strong style="color:{_COLOURS[finding.state]}">{inline(finding.state)}</strong>'),
+        "figure": None if value is None else f"{value:.3g} {claim.unit}",
+        "bound": claim.bound,
+        "from": finding.origin,
+        "test": f"`{claim.test}`" if claim.test else "none",
+    }

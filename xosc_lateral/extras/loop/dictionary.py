@@ -1,0 +1,300 @@
+"""All candidates as whitened rows of length one, their scores, and what chance gives.
+
+References
+----------
+.. [1] C. R. Rao, "Large sample tests of statistical hypotheses concerning several parameters with applications to
+       problems of estimation", Proc. Cambridge Philosophical Society 44, 1948: scores, fitted under the null alone.
+.. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.extras.loop.autocorrelation import Whitener
+from xosc_lateral.extras.loop.candidates import Candidate, Family, candidates_of
+from xosc_lateral.extras.loop.columns import Column
+from xosc_lateral.extras.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
+
+SingleArray = NDArray[np.float32]
+Reals = NDArray[np.floating[Any]]
+# Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the next.
+# [s]
+TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
+# The same for products, of which there are many more. [s]
+PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
+# A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]
+MIN_SUPPORT_S = 45.0
+LIKELIHOOD_MARGIN = 12.0  # Sets of columns that score lower than the best by more than this are not looked at. [-]
+LEFT_OVER = 0.05  # A candidate of which less than this share is left beside what is known is not tested. [-]
+# Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]
+CROSS_BASIS = 0.01
+ROBUST_ENTRIES = 200  # Entries whose scores are set beside the squares of their own rows: those that may be the best.
+# Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
+RESPONSE_ENTRIES = 12
+CHUNK_CANDIDATES = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+LEAST_POWER = 1e-30  # Keeps single precision from dividing by zero.
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """Candidates on the 1 Hz grid before lag and response, standardised, shape (candidates, n); `drive`, shape (n,)."""
+
+    candidates: list[Candidate]
+    values: SingleArray
+    drive: IndexArray
+
+    @classmethod
+    def of(
+        cls, candidates: Sequence[Candidate], timeline: Timeline, context: Mapping[str, FloatArray], valid: BoolArray
+    ) -> Quantities:
+        """Evaluate all; those that never vary on valid seconds are left out."""
+        kept, rows = [], []
+        for candidate in candidates:
+            quantity = timeline.held(candidate.values(context)[:, None], candidate.effect.episode)[:, 0]
+            there = quantity[timeline.valid & np.isfinite(quantity)]
+            # what is unknown takes the mean of what is known and valid
+            second = coarse_mean(np.where(np.isnan(quantity), there.mean() if len(there) else 0.0, quantity))
+            deviation = float(second[valid].std())
+            # beside all that it ever is: a product may be zero but for rounding wherever the car follows the road
+            if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
+                kept.append(candidate)
+                rows.append(((second - second[valid].mean()) / deviation).astype(np.float32))
+        stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
+        return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
+
+    def responses(self, members: IndexArray, response_s: float) -> FloatArray:
+        """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
+        return respond_by_second(self.values[members].T, response_s, self.drive)
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Whitened candidates at every lag and response."""
+
+    candidates: list[Candidate]  # One per entry.
+    lag: FloatArray  # shape (entries,): [s]
+    response: FloatArray  # shape (entries,): [s]
+    rows: SingleArray  # shape (entries, seconds): Length one each; valid seconds only.
+
+    @cached_property
+    def costs(self) -> FloatArray:
+        """Of the entries."""
+        return np.array([candidate.cost for candidate in self.candidates])
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def timed(self, index: int) -> ColumnEffect:
+        """An entry's effect with its lag and response."""
+        effect = self.candidates[index].effect
+        return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
+
+
+def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
+    """Pass every candidate through every response and lag, and whiten it; those left that rest on enough seconds."""
+    seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
+    entries: list[tuple[Candidate, float, float]] = []
+    blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
+    single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
+    for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
+        for first in range(0, len(members), CHUNK_CANDIDATES):
+            chunk = members[first : first + CHUNK_CANDIDATES]
+            for response_s, lags in grid.items():
+                response = quantities.responses(chunk, response_s)
+                for lag in lags:
+                    # drives are padded by more than any lag
+                    moved = response[np.clip(seconds - lag, 0, len(response) - 1)]
+                    rows = compact.rows(moved)
+                    squares = np.square(rows)
+                    power = squares.sum(axis=0)
+                    support = power**2 / np.maximum(np.square(squares).sum(axis=0), LEAST_POWER)
+                    varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), LEAST_POWER)  # within drives
+                    kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
+                    unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], LEAST_POWER))
+                    blocks.append(unit.T.astype(np.float32, copy=False))
+                    entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
+    timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
+    return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], np.concatenate(blocks))
+
+
+def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
+    """Means over each second of a first-order lag of gain 1, settled where a drive starts; shape (n, k)."""
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / response_s))
+    late = response_s * (1.0 - keep)
+    later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
+    response = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
+    return start_anew(response, values, keep, drive)
+
+
+def score_entries(
+    dictionary: Dictionary,
+    left: FloatArray,
+    known: FloatArray,
+    barred: BoolArray,
+    null: FloatArray,
+    *,
+    of_mean: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """Squared score of every entry less its cost, -inf if barred, and the largest of each of the `null`'s residuals;
+    beside `known`, orthonormal columns. Loudness where entries act is evidence of a spread, not of a mean."""
+    rotated = np.concatenate([left[:, None], null], axis=1)
+    rotated = beside(known, rotated).astype(np.float32)
+    basis = known.astype(np.float32)
+    squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
+    rest = np.empty(len(dictionary))
+    for first in range(0, len(dictionary), 2048):
+        part = slice(first, first + 2048)
+        rows = dictionary.rows[part]
+        squared[part] = np.square(rows @ rotated)
+        rest[part] = 1.0 - np.square(rows @ basis).sum(axis=1) if basis.shape[1] else 1.0
+    usable = ~barred & (rest > LEFT_OVER)
+    squared = squared / np.maximum(rest, LEFT_OVER).astype(np.float32)[:, None]
+    squared -= dictionary.costs.astype(np.float32)[:, None]
+    squared[~usable] = -np.inf
+    largest = squared.max(axis=0).astype(np.float64)
+    scores = squared[:, 0].astype(np.float64)
+    if of_mean:
+        scores = _beside_loud_stretches(scores, dictionary, left, basis)
+    return scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0)
+
+
+def _beside_loud_stretches(
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
+) -> FloatArray:
+    """Scores of the best entries by the squares of their own rows [2]_: the null loses where they are large."""
+    order = np.argsort(-scores)[:ROBUST_ENTRIES]
+    order = order[np.isfinite(scores[order])]
+    rows = dictionary.rows[order].astype(np.float64)
+    rows -= (rows @ basis) @ basis.T
+    columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
+    rest = np.empty_like(rows)
+    for read in set(columns):  # what some response to the same columns explains is not loudness
+        alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSE_ENTRIES]
+        span = orthonormal(rows[alike].T)
+        rest[[others == read for others in columns]] = beside(span, left)
+    power = np.maximum(np.square(rows).sum(axis=1), LEAST_POWER)
+    weights = np.square(rows) / power[:, None]
+    scatter = (weights * np.square(rest)).sum(axis=1)
+    # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
+    kurtosis = float(np.mean(left**4) / np.mean(left**2) ** 2)
+    scatter /= 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
+    scatter = np.maximum(scatter, 1.0)
+    robust = scores.copy()
+    costs = dictionary.costs[order]
+    robust[order] = (scores[order] + costs) / scatter - costs
+    return robust
+
+
+def beside_parts(
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, known: FloatArray, spans: Callable[[str], FloatArray]
+) -> FloatArray:
+    """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components."""
+    members: dict[tuple[str, ...], list[int]] = {}
+    for index in np.flatnonzero(np.isfinite(scores)):
+        candidate = dictionary.candidates[index]
+        if len(candidate.columns) > 1 and not candidate.of_vector:
+            members.setdefault(candidate.columns, []).append(int(index))
+    scores, best = scores.copy(), {pair: float(scores[entries].max()) for pair, entries in members.items()}
+    for pair in sorted(members, key=best.__getitem__, reverse=True):
+        if best[pair] < float(scores.max()) - LIKELIHOOD_MARGIN:
+            break
+        entries = members[pair]
+        span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
+        rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
+        power = np.square(rows).sum(axis=0)
+        gains = np.square(beside(span, left) @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
+        scores[entries] = np.where(power > LEFT_OVER, np.minimum(scores[entries], gains), -np.inf)
+    return scores
+
+
+def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
+    """Orthonormal basis of what holds all but a share of the columns' largest variance, shape (n, rank)."""
+    if columns.shape[1] == 0:
+        return columns
+    # by the Gram matrix: few columns of many rows, for which a singular value decomposition takes ten times as long
+    powers, directions = np.linalg.eigh(columns.T @ columns)
+    kept = powers > share * max(float(powers[-1]), 1e-300)
+    return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+def of_unit_variance(rows: FloatArray) -> FloatArray:
+    """Rows about zero, shape (n,), over their root mean square. [-]"""
+    return np.asarray(rows / max(float(np.sqrt(np.mean(rows**2))), 1e-300))
+
+
+def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
+    """Rows, shape (n,) or (n, k), without what an orthonormal basis, shape (n, rank), explains of them."""
+    return np.asarray(rows - basis @ (basis.T @ rows))
+
+
+# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
+KEPT_DICTIONARIES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What stays the same while terms are selected: columns, candidates before whitening, random streams."""
+
+    coarse: Coarse
+    columns: Mapping[str, Column]  # That may act.
+    quantities: Quantities
+    seed: np.random.SeedSequence
+    levels: Mapping[str, float]  # Family-wise p-value up to which the best of each component counts as found.
+    progress: Callable[[str], None]  # Gets what is being done, in a few words.
+    # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
+    # p-values, and components that have none are not tested. None: this is the table.
+    wanted: Mapping[str, int] | None = None
+    _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
+
+    @classmethod
+    def over(
+        cls,
+        coarse: Coarse,
+        columns: list[Column],
+        seed: np.random.SeedSequence,
+        levels: Mapping[str, float],
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> Search:
+        """Evaluate all candidates once."""
+        inside = coarse.timeline.valid
+        seen = {column.name: coarse.context[column.name][inside] for column in columns}
+        candidates = candidates_of(columns, seen)
+        quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
+        return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
+
+    def plain_candidates(self) -> list[Candidate]:
+        """Columns as they are, of one component each."""
+        candidates = self.quantities.candidates
+        return [one for one in candidates if one.family is Family.PLAIN and len(one.contrast) == 1]
+
+    def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
+        """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""
+        key = (kind, id(fitted))
+        if key not in self._kept:
+            self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
+            for old in list(self._kept)[:-KEPT_DICTIONARIES]:
+                del self._kept[old]
+        return self._kept[key][1]
+
+    def cross_basis(self, columns: Collection[str]) -> FloatArray:
+        """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
+        known = frozenset(columns)
+        members = np.array([known.issuperset(one.columns) for one in self.quantities.candidates], dtype=np.bool_)
+        seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
+        blocks = []
+        for response_s, lags in TIMINGS.items():
+            response = self.quantities.responses(np.flatnonzero(members), response_s)
+            blocks += [response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for lag in lags]
+        return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)

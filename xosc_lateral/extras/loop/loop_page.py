@@ -1,0 +1,279 @@
+"""A closed loop for a person: what was missing, how sure, how big, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.extras.loop import loop_figures, loop_shown, loop_words
+from xosc_lateral.extras.loop.close import Finding, LoopResult
+from xosc_lateral.extras.loop.held_out import SNIPPET_ROWS
+from xosc_lateral.extras.loop.identify import held_out_words
+from xosc_lateral.extras.loop.loop_json import column_record
+from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.profiles import profile_hash
+from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
+
+NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
+LEFT_ROWS = 8  # Rows of the table of what is left.
+# Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
+BAD_RATIO, GOOD_RATIO = 2.0, 1.2
+
+
+def loop_text(result: LoopResult) -> str:
+    """The outcome in a few lines; what is left is worked out unless it is given."""
+    lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
+    lines = lines or ["no effect added"]
+    lines += [
+        f"{loop_words.taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back
+    ]
+    unlike = [one for one in result.identified.selection.rejected if one.own_way]
+    lines += [f"{loop_words.taken_back_words(one)}: {one.why}" for one in unlike]
+    for item in result.identified.usable.feedback:
+        sure = "possibly a" if item.doubtful else "a"
+        lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
+    before, after, halves = (1000.0 * value for value in (result.error_before, result.error_after, result.floor))
+    if (own_errors := result.own_errors) is not None:
+        own_before, own_after = (1e3 * value for value in own_errors)
+        lines.append(f"where the effects act: held-out error {own_before:.1f} mm before, {own_after:.1f} mm after")
+    over = "over everything: " if result.own_errors else ""
+    ends = f"{before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
+    lines.append(f"{over}held-out error {ends}")
+    lines += [words for words in (loop_words.explained_words(result), loop_words.lack_of_fit_words(result)) if words]
+    return "\n".join(lines)
+
+
+def finding_sentence(finding: Finding) -> str:
+    """One finding in a line."""
+    when = ""
+    if finding.lag_s is not None:
+        early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
+        when = f", {early}, response time {finding.response_s:.1f} s"
+    alike = f"; {loop_words.others_words(finding)} would explain it about as well" if finding.alike else ""
+    size = "" if finding.kind == "memory" else f", {loop_words.size_words(finding)}"
+    return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
+
+
+def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
+    """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
+    timeline = result.coarse.timeline
+    drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
+    page = Page(f"Closed loop: {', '.join(drives)}")
+    page.lead(loop_words.outcome(result))
+    tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
+    own_errors = result.own_errors
+    figures = (
+        []
+        if own_errors is None
+        else [
+            KeyFigure(
+                f"{1e3 * own_errors[0]:.1f} mm", "before, where the effects act", "in the cells of what was found"
+            ),
+            KeyFigure(f"{1e3 * own_errors[1]:.1f} mm", "after, where the effects act", "in the same cells"),
+        ]
+    )
+    page.key_figures(
+        [
+            *figures,
+            KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
+            KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
+            KeyFigure(
+                f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"
+            ),
+        ]
+    )
+    page.lead(f"{loop_words.explained_words(result)} {loop_words.lack_of_fit_words(result)}".strip())
+    _add_findings(page, result, proofs)
+    _add_residuals(page, result)
+    _add_movement(page, result)
+    page.section("What these drives can show", loop_shown.SHOWN_NOTE)
+    page.table(loop_shown.shown_rows(result.shown))
+    page.section("Consequences of the car's own movement")
+    feedback = result.identified.usable.feedback
+    if feedback:
+        page.text(
+            "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel "
+            "is. They are not used as causes."
+        )
+        page.table([{"column": item.column, "reason": loop_words.feedback_words(item)} for item in feedback])
+    else:
+        page.text("None.")
+    page.section(
+        "Tested and rejected",
+        "The strongest candidate of each component that was not significant, and what was found and taken back.",
+    )
+    page.table(
+        [
+            {
+                "component": loop_words.COMPONENT_WORDS.get(item.component, item.component),
+                "strongest candidate": ", ".join(item.columns) or None,
+                "p-value": item.p_value,
+                "reason": item.why,
+            }
+            for item in result.identified.selection.rejected
+        ],
+        formats={"p-value": ".2g"},
+    )
+    page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
+    page.section("Columns, and what they are taken for")
+    page.table(
+        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
+        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
+        "`--role COLUMN=ROLE`.",
+    )
+    page.section("How to read this page")
+    runs = len(result.scored.runs_after)
+    page.items(line.format(n_runs=runs, certain=f"{loop_words.CERTAIN_P_VALUE:g}") for line in HOW_TO_READ)
+    return page.html(
+        {
+            "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
+            "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
+            "held out": held_out_words(timeline),
+            "seed": result.seed,
+            **{name: value[:16] for name, value in parsed_hashes(tables).items()},
+        }
+    )
+
+
+HOW_TO_READ = (
+    "Offset: distance of the rear axle from the lane centre, positive to the left of travel.",
+    "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
+    "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
+    "simulated runs of the profile under the same context.",
+    "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, "
+    "no mean, spread or frequency band distinguishes the profile from the driver.",
+    "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
+    "and shapes that were tested count. Below {certain} it is extrapolated; read it as certain.",
+    "Lag: negative if the driver looks ahead. Response: time constant of a first-order lag, after which about two "
+    "thirds of the response have happened.",
+)
+
+
+def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None:
+    page.section("What the profile lacked")
+    if not result.findings:
+        stays = "stays as it was given" if result.base_given else "is the base that was fitted to these drives"
+        page.text(f"Nothing was added: the profile {stays}.")
+        return
+    for finding in result.findings:
+        page.heading(_capital(finding.effect))
+        page.text(loop_words.meaning(finding, result))
+        effect = finding.effects[0] if finding.effects else None
+        if not isinstance(effect, ColumnEffect):
+            draw, caption = loop_figures.DRAWINGS[effect.kind if effect is not None else finding.kind]
+            page.figure(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")
+        elif finding.statistic in result.scored.real:
+            page.figure(
+                loop_figures.effect_figure(result, finding),
+                "Path: where the effect puts the car while its column goes from its usual value to a high one and "
+                "back. Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and "
+                "bands: two standard errors. Held-out blocks: means by fifths of the effect.",
+                f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
+            )
+    page.heading("All effects in numbers")
+    timed = any(finding.lag_s is not None for finding in result.findings)
+    page.table(
+        [
+            {"effect": finding.effect, "shape": finding.shape, "size": loop_words.size_words(finding)}
+            | ({"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {})
+            | {"p-value": finding.p_value}
+            | {"error before [mm]": 1000.0 * finding.error_before, "error after [mm]": 1000.0 * finding.error_after}
+            for finding in result.findings
+        ],
+        "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
+        "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
+        formats={"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"}
+        | dict.fromkeys(("error before [mm]", "error after [mm]"), ".1f"),
+    )
+    if proofs:
+        caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
+        page.table([{"in a scenario": one} for one in proofs], caption)
+    applied = (
+        "`sample --context` and `convert` apply it where the context has the columns, and name the columns that are "
+        "missing."
+        if any(finding.columns for finding in result.findings)
+        else "Effects without a column are drawn anew for every simulated vehicle."
+    )
+    page.text(f"The refined profile `{result.refined.name}` contains what was found. {applied}")
+
+
+def _add_residuals(page: Page, result: LoopResult) -> None:
+    page.section(
+        "Residual by context",
+        "Measured minus expected offset on held-out blocks, by quantile groups of every column and by time; the values "
+        "of the column stand below each panel. The band is the sampling error (95 %): residuals within it are no sign "
+        "of a lack of fit.",
+    )
+    page.text("" if result.identified.usable.columns else "The table has no column that varies.")
+    for what, words in (("mean", "mean offset"), ("spread", loop_words.SPREAD)):
+        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real):
+            page.heading(_capital(words))
+            page.figure(
+                loop_figures.residual_figure(result, what),
+                f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",
+                f"Residual of the {words} by every context column.",
+            )
+    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
+    page.table(
+        [
+            {
+                "group": loop_words.group_words(group.name, result),
+                "before": 1000.0 * group.before,
+                "after": 1000.0 * group.after,
+            }
+            | {"between halves": 1000.0 * group.floor, "ratio": group.after / group.floor if group.floor > 0 else None}
+            for group in groups
+        ],
+        f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
+        "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
+        formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
+        tones={k: "bad" for k, group in enumerate(groups) if group.after > BAD_RATIO * group.floor},
+    )
+
+
+def _add_movement(page: Page, result: LoopResult) -> None:
+    page.section("Movement")
+    page.figure(
+        loop_figures.traces_figure(result),
+        "Offsets as measured, and one simulated run of the profile before and of the profile after under the same "
+        "context, on blocks that neither was fitted to. The curves are not meant to coincide: two drives of the same "
+        "driver do not either. What should agree is how they move.",
+        "Measured and simulated offsets over time, drive by drive",
+    )
+    page.figure(
+        loop_figures.spectrum_figure(result),
+        "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement is "
+        "like the measured one at that frequency.",
+        "Spectra, measured, before and after.",
+    )
+    scores, seconds = result.scores, (SNIPPET_ROWS - 1) * result.coarse.timeline.step
+    if scores.before is None or scores.after is None or scores.floor is None:
+        page.text(f"There are too few snippets of {seconds:g} s to compare metrics.")
+        return
+    before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
+    page.table(
+        [
+            {"metric": METRIC_WORDS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
+            for name in before
+        ],
+        f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
+        formats=dict.fromkeys(("before", "after", "between halves"), ".3f"),
+        tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
+    )
+    page.figure(
+        violin_figure(scores.real, scores.sampled_after, scores.sampled_before, ("measured", "profile")),
+        f"Ten metrics of snippets of {seconds:g} s: measured (left, blue), profile after (right, orange), profile "
+        "before (dashed). Bars: minimum, mean, maximum.",
+        "Ten violins, measured beside the profile after and before.",
+    )
+
+
+def _tone(value: float, floor: float) -> Tone:
+    return "bad" if value > BAD_RATIO * floor else "good" if value <= GOOD_RATIO * floor else ""
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]

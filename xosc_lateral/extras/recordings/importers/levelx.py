@@ -1,0 +1,280 @@
+"""HighD and exiD (leveLXData, RWTH Aachen) into the standard drive table, from their published column layouts.
+
+A recording is three files, ``XX_tracks.csv``, ``XX_tracksMeta.csv`` and ``XX_recordingMeta.csv``.
+
+highD [1]_ : image coordinates in metres, y pointing DOWN; `x`, `y` are the upper left corner of the bounding box,
+`width` its extent along the road and `height` across; the straight lane markings stand in the recording's meta file;
+the upper lanes (drivingDirection 1) drive towards -x.
+
+exiD [2]_ : lateral offset and lane width come along with every row (`latLaneCenterOffset`, `laneWidth`; several values
+parted by ``;`` where lanelets overlap: the first one counts). Which side is positive there is found from the data, by
+comparing the offset's rate with the heading, so that `offset` is positive to the left whatever the release says.
+
+References
+----------
+.. [1] R. Krajewski et al., ITSC 2018, doi:10.1109/ITSC.2018.8569552
+.. [2] T. Moers et al., IV 2022, doi:10.1109/IV51971.2022.9827305
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.rates import rate
+from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
+from xosc_lateral.drivers.drives.identity import identify
+from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
+from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
+from xosc_lateral.files.mapping import classes_of
+from xosc_lateral.files.tables import read_table
+from xosc_lateral.world.surroundings.lane_order import NEIGHBOUR_DISTANCE, find_neighbours
+
+LICENCE = (
+    "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
+    "parameters may be passed on is for that licence to say"
+)
+HIGHD_COLUMNS = ("frame", "id", "x", "y", "width", "height", "xVelocity", "xAcceleration")
+EXID_COLUMNS = (
+    *("trackId", "frame", "xCenter", "yCenter", "heading", "length", "lonVelocity", "lonAcceleration"),
+    *("latLaneCenterOffset", "laneWidth", "laneletId", "laneChange", "leadId", "leadDHW"),
+    *("leftLeadId", "leftRearId", "leftAlongsideId", "rightLeadId", "rightRearId", "rightAlongsideId"),
+)
+
+
+@importer
+def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
+    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
+    files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
+    if not files:
+        raise FormatError("no XX_tracks.csv in this folder", path=source)
+    parts, layouts, steps, dropped = [], set[str](), set[float](), Counter[str]()
+    for path in files:
+        recording = Recording.read(path)
+        layouts.add("exiD" if recording.is_exid else "highD")
+        steps.add(1.0 / recording.frame_rate)
+        parts.append((_from_exid if recording.is_exid else _from_highd)(recording, settings))
+        dropped += recording.dropped
+    if len(layouts) > 1 or len(steps) > 1:
+        raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
+    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings), "dropped": dropped}
+    return imported(pd.concat(parts, ignore_index=True), sources=files, step=steps.pop(), **about)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording's tracks, a row of `meta` for each of them, and one of `about` for all."""
+
+    path: Path  # of the tracks
+    tracks: pd.DataFrame
+    meta: pd.DataFrame
+    about: pd.DataFrame
+    dropped: Counter[str] = field(default_factory=Counter)  # rows by the reason why they are in no drive
+
+    @classmethod
+    def read(cls, path: Path) -> Recording:
+        """By the path of its tracks. Raises `FormatError`, `NotEnoughDataError`."""
+        tables = []
+        for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"):
+            file = path.with_name(path.name.replace("_tracks.csv", ending))
+            if not file.exists():
+                what = "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv"
+                raise FormatError(what, path=file)
+            tables.append(read_table(file))
+            if tables[-1].empty:
+                raise NotEnoughDataError(f"{file}: has no rows")
+        return cls(path, tables[0], tables[1], tables[2])
+
+    @property
+    def number(self) -> str:
+        """As it is counted in the data set."""
+        return self.path.name.split("_")[0]
+
+    @property
+    def is_exid(self) -> bool:
+        """Else it is of highD."""
+        return "latLaneCenterOffset" in self.tracks.columns
+
+    @property
+    def frame_rate(self) -> float:
+        """[1/s]"""
+        rate = self._stated("frameRate")
+        if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+            raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=self.path)
+        return float(rate)
+
+    def markings(self, side: str) -> FloatArray:
+        """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
+        return np.array([float(part) for part in self._stated(f"{side}LaneMarkings").split(";")])
+
+    def _stated(self, column: str) -> str:
+        if column not in self.about.columns or self.about.empty:
+            raise FormatError(f"no value of {column} in the recording's meta file", path=self.path)
+        return str(self.about[column].iloc[0])
+
+    def classes(self, meta: pd.DataFrame) -> NDArray[np.str_]:
+        """Of the rows of `meta`, in the package's words."""
+        return classes_of(meta["class"].astype(str), self.path, "class").to_numpy(dtype=str)
+
+    def identified(self, name: str, x: str, y: str) -> pd.DataFrame:
+        """Rows by vehicle and time, with `vehicle`, and its `name`; see `dropped`."""
+        codes, labels = self.tracks[name].factorize(sort=True)
+        time, east, north = (self.tracks[column].to_numpy(dtype=np.float64) for column in ("frame", x, y))
+        known = identify([str(label) for label in labels], codes, time / self.frame_rate, east, north, path=self.path)
+        self.dropped.update(known.dropped)
+        names = np.array(known.names, dtype=object)[known.vehicle]
+        return self.tracks.iloc[known.rows].reset_index(drop=True).assign(vehicle=known.vehicle, name=names)
+
+    def require(self, columns: Sequence[str]) -> None:
+        """Refuse tracks that lack a column."""
+        if missing := [name for name in columns if name not in self.tracks.columns]:
+            raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=self.path, line=1)
+
+
+def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+    recording.require(HIGHD_COLUMNS)
+    step, tracks = 1.0 / recording.frame_rate, recording.identified("id", "x", "y")
+    meta = recording.meta.set_index("id").reindex(tracks["id"])
+    rightwards = meta["drivingDirection"].to_numpy() == 2
+    way = np.where(rightwards, 1.0, -1.0)
+    velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
+    where = "the recording's drivingDirection"
+    require_lane_direction(way * np.sign(velocity), np.abs(velocity), where, recording.path)
+    # y points down: for traffic towards +x the left is at smaller y.
+    x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
+    left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
+    lane, offset, width, count = (np.zeros(len(tracks)) for _ in range(4))
+    for mine, side, sign in ((rightwards, "lower", -1.0), (~rightwards, "upper", 1.0)):
+        marks = np.sort(sign * recording.markings(side))
+        index = np.searchsorted(marks, left[mine]) - 1
+        inside = np.clip(index, 0, len(marks) - 2)
+        lane[mine] = np.where(index == inside, index, -1)
+        offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
+        width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
+    lane_number, frame = lane.astype(np.int64), tracks["frame"].to_numpy()
+    kind = recording.classes(meta)
+    is_truck, instant, length = np.isin(kind, list(TRUCKS)), frame * 2 + rightwards, tracks["width"].to_numpy()
+    on_left, on_right = lane_number < count - 1, lane_number > 0
+    near = find_neighbours(instant, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
+    columns = {
+        "drive": f"highd-{recording.number}-" + tracks["name"],
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": np.abs(tracks["xVelocity"].to_numpy()),
+        "acceleration": way * tracks["xAcceleration"].to_numpy(),
+        "lane_index": lane_number,
+        "lane_count": count.astype(np.int64),
+        **near,
+    }
+    return cut_table(
+        columns, settings, vehicle=tracks["vehicle"].to_numpy(), time=frame * step, lane=lane_number, step=step,
+        sideways=left, reasons={"no lane": lane_number < 0}, kind=kind, is_truck=is_truck,
+    )  # fmt: skip
+
+
+def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+    recording.require(EXID_COLUMNS)
+    step, tracks = 1.0 / recording.frame_rate, recording.identified("trackId", "xCenter", "yCenter")
+    kind = recording.classes(recording.meta.set_index("trackId").reindex(tracks["trackId"]))
+    offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
+    vehicle, frame = tracks["vehicle"].to_numpy(), tracks["frame"].to_numpy()
+    known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
+    # A new lane shows as a step of the offset; lanelets that follow one another along the road don't.
+    step_of_offset = np.diff(offset, prepend=offset[:1])
+    jump = (np.abs(step_of_offset) > 0.5 * width) | (tracks["laneChange"].to_numpy() == 1)
+    jump &= np.r_[False, vehicle[1:] == vehicle[:-1]]
+    lane = np.cumsum(jump).astype(np.int64)
+    lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
+    offset = offset * _left_sign(lateral, tracks, vehicle, step, recording.path)
+    is_truck = np.isin(kind, list(TRUCKS))
+    columns = {
+        "drive": f"exid-{recording.number}-" + tracks["name"],
+        "time": np.round(frame * step, 4),
+        "offset": offset,
+        "lane_width": width,
+        "speed": tracks["lonVelocity"].to_numpy(),
+        "acceleration": tracks["lonAcceleration"].to_numpy(),
+        **_exid_neighbours(tracks, is_truck),
+    }
+    return cut_table(
+        columns, settings, vehicle=vehicle, time=frame * step, lane=lane, step=step, sideways=lateral,
+        reasons={"no vehicle": ~np.isin(kind, list(DRIVEN)), "no lane": ~known}, kind=kind, is_truck=is_truck,
+    )  # fmt: skip
+
+
+def _first(column: pd.Series) -> FloatArray:
+    """First of the values parted by ``;``; NaN where there is none."""
+    if column.dtype.kind == "f":
+        return column.to_numpy(dtype=np.float64)
+    first = column.astype(str).str.split(";").str[0]
+    return np.asarray(pd.to_numeric(first, errors="coerce").to_numpy(dtype=np.float64))
+
+
+def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
+    """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
+
+    By the correlation of its rate with the way to the left, by the heading less its own mean over 4 s (the road's
+    course).
+    """
+    heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
+    half = max(1, round(2.0 / step))
+    inside = np.arange(half, max(half, len(vehicle) - half))
+    inside = inside[vehicle[inside + half] == vehicle[inside - half]]
+    if len(inside) < 100:
+        raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to find which side is left")
+    towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
+    aside = _about_mean(rate(lateral, 1.0), inside, half)
+    agreement = float(np.corrcoef(towards_left, aside)[0, 1])
+    if not abs(agreement) > 0.1:
+        what = f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}"
+        raise FormatError(what, path=path, element="latLaneCenterOffset")
+    return float(np.sign(agreement))
+
+
+def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:
+    """Values at `rows`, less their own mean over `half` rows to each side."""
+    summed = np.concatenate([[0.0], np.cumsum(values)])
+    return np.asarray(values[rows] - (summed[rows + half + 1] - summed[rows - half]) / (2 * half + 1))
+
+
+def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[str, FloatArray]:
+    """Leader and neighbours from the ids that come along; distances bumper to bumper. Which lanes there are is not in
+    the tracks, so beside, NaN is no lane as well as nobody."""
+    frame = tracks["frame"].to_numpy(dtype=np.int64)
+    places = pd.MultiIndex.from_arrays([frame, tracks["trackId"].to_numpy(dtype=np.int64)])
+    rows, places = np.flatnonzero(~places.duplicated()), places.drop_duplicates()
+    heading = np.radians(tracks["heading"].to_numpy())
+    east, north, length = (tracks[name].to_numpy(dtype=np.float64) for name in ("xCenter", "yCenter", "length"))
+
+    def rows_of(column: str) -> IntArray:
+        """Row of the vehicle of the first id at the same frame; -1: none."""
+        ids = np.nan_to_num(_first(tracks[column]), nan=-1.0).astype(np.int64)
+        place = places.get_indexer(pd.MultiIndex.from_arrays([frame, ids]))
+        return np.where(place >= 0, rows[place], -1)
+
+    lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), rows_of("leadId")
+    there = (lead_row >= 0) & (lead >= 0.0) & (lead <= NEIGHBOUR_DISTANCE)
+    near = {
+        "lead_distance": np.where(there, lead, np.inf),
+        "lead_is_truck": np.where(there, is_truck[lead_row], False).astype(np.float64),
+    }
+    for side in ("left", "right"):
+        best, truck = np.full(len(tracks), np.inf), np.zeros(len(tracks))
+        for place in ("Lead", "Rear", "Alongside"):
+            other = rows_of(f"{side}{place}Id")
+            along = (east[other] - east) * np.cos(heading) + (north[other] - north) * np.sin(heading)
+            free = np.maximum(np.abs(along) - 0.5 * (length + length[other]), 0.0)
+            gap = np.where(other >= 0, free, np.inf)
+            closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
+            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
+        near |= {f"{side}_distance": np.where(np.isfinite(best), best, np.nan), f"{side}_is_truck": truck}
+    return near

@@ -1,0 +1,251 @@
+"""From a recording to maneuvers, a road and drivers.
+
+Which of several profiles drove a vehicle, the likelihood of how it moved in its lane says. A profile has none in closed
+form, but its free runs say how a summary of windows scatters between drivers and within one: a normal model of the
+summary's mean (synthetic likelihood [1]_, with a random effect per driver).
+
+References
+----------
+.. [1] S. N. Wood, "Statistical inference for noisy nonlinear ecological dynamic systems", Nature 466, 2010.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Unpack
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.texts import composed
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.drivers.evaluation.metrics import free_runs
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.extras.recordings.encounters import encounters, relative_triggers
+from xosc_lateral.extras.recordings.plan import VehiclePlan, plan_vehicles
+from xosc_lateral.extras.recordings.reconstruction import ChosenDriver, Reconstruction
+from xosc_lateral.extras.recordings.recorded import RecordedTrack, place_tracks
+from xosc_lateral.extras.recordings.recordings import RecordedTraffic, read_recording
+from xosc_lateral.extras.recordings.scenario import reconstructed_scenario
+from xosc_lateral.extras.recordings.settings import ReconstructKeywords, ReconstructSettings
+from xosc_lateral.files.mapping import MappingLike
+from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
+from xosc_lateral.files.remote import local
+from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
+from xosc_lateral.workflows.options import spelled_out, values_of
+from xosc_lateral.workflows.result import PathLike
+from xosc_lateral.world.surroundings.lane_order import RoadLanes
+
+LONG_DRIVE = 100.0  # of road-following, for a profile of one vehicle: ten windows that the evaluation compares [s]
+LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]
+SURROUNDING_DISTANCE = 100.0  # who comes as near to a vehicle, along or across, belongs to its surroundings [m]
+NO_HOST = "none"  # stands for no vehicle under test
+
+
+@spelled_out(ReconstructSettings)
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    columns: MappingLike | None = None,
+    force: bool = False,
+    **options: Unpack[ReconstructKeywords],
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, OSI traces, CommonRoad, SUMO's FCD output, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
+    force : bool
+        Replace files that this package did not write.
+    options
+        `ReconstructSettings`.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    settings = ReconstructSettings(**values_of(ReconstructSettings, options))
+    kind, road, case = settings.format, settings.road, settings.case
+    traffic = read_recording(local(recording), kind=kind, road=road, columns=columns, recording=case)
+    result = reconstruct_recording(traffic, settings)
+    if output is not None:
+        result.write(output, force=force)
+    return result
+
+
+def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstruction:
+    """Choose vehicles, plan their maneuvers, write the scenario in memory, and say who drove."""
+    vehicles = None if settings.vehicles is None else frozenset(map(composed, settings.vehicles))
+    settings = replace(settings, vehicles=vehicles, host=composed(settings.host), around=composed(settings.around))
+    no_host = settings.host == NO_HOST and all(track.name != NO_HOST for track in traffic.tracks)
+    host = None if no_host else settings.host or traffic.host
+    tracks, begin, end = chosen(traffic, settings, settings.host and host)
+    network = traffic.network
+    recording = place_tracks(tracks, network, begin, end)
+    plans = plan_vehicles(recording, network, error=settings.error)
+    entity = next((plan.name for plan in plans if plan.vehicle.name == host), None)
+    if settings.host is not None and host is not None and entity is None:
+        raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
+    lanes = RoadLanes(network)
+    met = encounters(plans, lanes)
+    is_relative = settings.relative and not settings.exact
+    relative = {plan.name: relative_triggers(plan, plans, lanes) for plan in plans if is_relative}
+    scenario = reconstructed_scenario(traffic, recording, plans, relative, settings, entity)
+    return Reconstruction(traffic, recording, plans, scenario, met, relative, *_drivers(plans, settings), entity)
+
+
+def _drivers(
+    plans: Sequence[VehiclePlan], settings: ReconstructSettings
+) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
+    from xosc_lateral.drivers.fitting.fitting import fit_profile
+
+    population = find_profile(AUTO_PROFILE, settings.library)
+    paths = {path.stem: path for path in reversed(list_profiles(settings.library))}
+    models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
+    drivers, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
+    for plan in plans:
+        if plan.lateral.is_played:
+            drivers.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
+            continue
+        stretches = in_lane_offsets(plan)
+        driver = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
+        if settings.fit and driver.seconds >= LONG_DRIVE:
+            time, offset, width = (np.concatenate(columns) for columns in zip(*stretches, strict=True))
+            context = {"speed": plan.speed.at(time), "lane_width": width}
+            run = np.repeat(np.arange(len(stretches)), [len(stretch[0]) for stretch in stretches])
+            try:
+                drive = Drive(plan.name, time, offset, width, context, run=run)
+                fitted[plan.name] = fit_profile([drive], name=plan.name)
+                driver = replace(driver, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
+            except XoscLateralError as error:
+                driver = replace(driver, why=f"{driver.why}; can't be fitted: {error}")
+        drivers.append(driver)
+    return tuple(drivers), fitted
+
+
+@lru_cache(maxsize=64)
+def _window_model(path: Path, _changed: int) -> WindowModel:
+    return WindowModel.of(read_profile(path))
+
+
+def chosen(
+    traffic: RecordedTraffic, settings: ReconstructSettings, host: str | None
+) -> tuple[list[RecordedTrack], float, float]:
+    """Tracks and window of time [s] that the settings ask for."""
+    by_name = {track.name: track for track in traffic.tracks}
+    source = traffic.sources[0]
+    for word, names in {"vehicles": settings.vehicles or (), "around": [settings.around], "host": [host]}.items():
+        for name in names:
+            if name is not None and name not in by_name:
+                some = ", ".join(list(by_name)[:8])
+                raise FormatError(f"--{word} {name}: no such vehicle; there are {some}, ...", path=source)
+    first, last = traffic.span
+    begin = first if settings.begin is None else settings.begin
+    end = last if settings.end is None else settings.end
+    tracks = list(traffic.tracks)
+    if settings.around is not None:
+        centre = by_name[settings.around]
+        middle = 0.5 * (max(centre.time[0], begin) + min(centre.time[-1], end))
+        begin, end = max(begin, middle - 0.5 * settings.window), min(end, middle + 0.5 * settings.window)
+        tracks = [track for track in tracks if centre.distance(track, begin, end) <= SURROUNDING_DISTANCE]
+    if settings.vehicles is not None:
+        tracks = [track for track in tracks if track.name in settings.vehicles]
+    begin, end = max(begin, first), min(end, last)
+    if end - begin < 1.0:
+        what = f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s"
+        raise FormatError(what, path=source)
+    if end - begin > LONGEST_WINDOW:
+        what = f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to"
+        raise FormatError(what, path=source)
+    return tracks, begin, end
+
+
+WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]
+MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
+FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
+LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
+
+
+def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
+    residuals = plan.residuals
+    time, width = residuals.time, plan.vehicle.lane_width[-len(residuals.time) :]
+    following = plan.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
+    parts = []
+    for part in true_slices(following):
+        even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
+        if len(even) * STEP > WINDOW:
+            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.columns["across"], width))
+            parts.append((even, across, wide))
+    return parts
+
+
+def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
+    """The likeliest profile of offsets in lane [m], every `STEP`."""
+    seen = [_summaries(_windows(offset)) for offset in stretches]
+    seconds = STEP * sum(map(len, stretches))
+    if not seen:
+        return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
+    windows = np.concatenate(seen)
+    gains = {
+        name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
+        for name, model in models.items()
+    }
+    best = max(gains, key=lambda name: gains[name])
+    if best != population and gains[best] > MINIMUM_LOG_ODDS:
+        return ChosenDriver(best, seconds, gains[best], "likeliest of the library")
+    return ChosenDriver(population, seconds, 0.0, "the population's: no other is clearly likelier")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class WindowModel:
+    """How window summaries of a profile scatter."""
+
+    mean: FloatArray  # mean offset [m], log spread [log m], log lateral speed [log m/s], shape (3,)
+    # between, within: covariance of drivers' means, and of windows about their driver's mean, shape (3, 3)
+    between: FloatArray
+    within: FloatArray
+
+    @classmethod
+    def of(cls, profile: DriverProfile, seed: int = 0) -> WindowModel:
+        """From free runs."""
+        every = max(1, round(STEP / profile.model.step))
+        runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
+        each = [_summaries(_windows(run)) for run in runs]
+        means = np.array([windows.mean(axis=0) for windows in each])
+        within = np.mean([np.cov(windows.T) for windows in each], axis=0)
+        between = np.cov(means.T) - within / len(each[0])
+        values, vectors = np.linalg.eigh(between)
+        between = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return cls(means.mean(axis=0), between, within)
+
+    def log_likelihood(self, windows: FloatArray) -> float:
+        """Of the mean of one driver's windows, shape (k, 3). [nat]"""
+        covariance = self.between + self.within / len(windows)
+        away = windows.mean(axis=0) - self.mean
+        return float(-0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(covariance)[1]))
+
+
+def _windows(offset: FloatArray) -> FloatArray:
+    length = round(WINDOW / STEP)
+    return offset[: len(offset) // length * length].reshape(-1, length)
+
+
+def _summaries(windows: FloatArray) -> FloatArray:
+    """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
+    spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
+    speed = np.sqrt((rate(windows, STEP, past=True)[:, 1:] ** 2).mean(axis=1))
+    return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])

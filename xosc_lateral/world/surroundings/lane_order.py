@@ -1,0 +1,412 @@
+"""How pieces of lanes hang together, who is on them at one instant, and who drives ahead, behind and beside.
+
+The one answer to who is next to whom in which lane, for imports, `reconstruct`, maneuver profiles and `detect`. What a
+driver makes of those around, as their bodies come and go, is `world.surroundings.around`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.track import MAX_GAP
+from xosc_lateral.world.motion.nominal import EntityMotion
+from xosc_lateral.world.road.lanes import DRIVING, beside
+from xosc_lateral.world.road.network import RoadNetwork
+
+INTO_NEXT = 1e-3  # step beyond a section's end that brings one into the next [m]
+
+
+@dataclass(frozen=True, eq=False)
+class LaneGraph:
+    """Pieces of lanes and how they hang together."""
+
+    length: FloatArray  # of each piece, along the road, shape (n,) [m]
+    left: IntArray  # piece beside it on the left that is driven the same way; -1: none, shape (n,)
+    following: Sequence[Sequence[int]]  # pieces that it leads to
+    # facing: of two pieces beside each other, ways along the first and those along the second that face them [m];
+    # without it they are of one length
+    facing: Mapping[tuple[int, int], tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+
+    @cached_property
+    def layout(self) -> tuple[IntArray, list[tuple[FloatArray, FloatArray]], IntArray]:
+        """Part of the network, ways along each piece with their stations [m], and its rank, growing to the left.
+
+        Breadth first from the first piece of each part. Where ways of different length meet, the first one counts;
+        pieces that come to lie on one another there get parts of their own.
+        """
+        n = len(self.length)
+        part, rank = np.full(n, -1), np.zeros(n, dtype=np.int64)
+        lines = [(np.zeros(1), np.zeros(1))] * n
+        # from each piece to those about it: piece, lanes to the left, +1 ahead or -1 behind
+        steps: list[list[tuple[int, int, int]]] = [[] for _ in self.length]
+        for piece, left in enumerate(self.left.tolist()):
+            if left >= 0:
+                steps[piece].append((left, 1, 0))
+                steps[left].append((piece, -1, 0))
+        for piece, after in enumerate(self.following):
+            for other in after:
+                steps[piece].append((other, 0, 1))
+                steps[other].append((piece, 0, -1))
+
+        def straight(piece: int, start: float) -> tuple[FloatArray, FloatArray]:
+            return np.array([0.0, self.length[piece]]), np.array([start, start + self.length[piece]])
+
+        taken: dict[tuple[int, int], list[tuple[float, float]]] = {}
+        count = 0
+        for first in range(n):
+            if part[first] >= 0:
+                continue
+            waiting = deque([(first, straight(first, 0.0), 0)])
+            while waiting:
+                piece, line, level = waiting.popleft()
+                (at, end), here = (float(line[1][k]) for k in (0, -1)), taken.setdefault((count, level), [])
+                if part[piece] >= 0 or any(at < other - 1e-3 and end > begin + 1e-3 for begin, other in here):
+                    continue
+                part[piece], lines[piece], rank[piece] = count, line, level
+                here.append((at, end))
+                for other, side, where in steps[piece]:
+                    start = {0: at, 1: end, -1: at - float(self.length[other])}[where]
+                    faced = self.facing.get((other, piece)) if where == 0 else None
+                    other_line = straight(other, start) if faced is None else (faced[0], follow(faced[1], line))
+                    put = waiting.appendleft if where == 0 else waiting.append  # what lies beside, before what follows
+                    put((other, other_line, level + side))
+            count += 1
+        return part, lines, rank
+
+    def stations(self, piece: IntArray, along: FloatArray) -> tuple[IntArray, FloatArray, IntArray, FloatArray]:
+        """Part, station [m], rank of places `along` pieces [m], and metres along a piece per metre of station."""
+        part, lines, rank = self.layout
+        station, scale = np.array(along, dtype=np.float64), np.ones(len(along))
+        for number in np.unique(piece):
+            mine = piece == number
+            here = along[mine]
+            station[mine] = follow(here, lines[number])
+            ends = follow(here - SLOPE_LENGTH, lines[number]), follow(here + SLOPE_LENGTH, lines[number])
+            scale[mine] = 2.0 * SLOPE_LENGTH / np.maximum(ends[1] - ends[0], SLOPE_LENGTH)
+        return part[piece], station, rank[piece], scale
+
+
+class At(NamedTuple):
+    """Where a vehicle is at a moment."""
+
+    road: int  # index into the network's
+    lane: int
+    way: int  # 1: as its lane is driven, -1: against it
+    s: float  # of its reference point [m]
+    ahead: float  # of that, its middle [m]
+    length: float  # [m]
+
+    @classmethod
+    def of(cls, motion: EntityMotion, row: int, s: float | None = None) -> At:
+        """In the lane of a row; `s`: a place along it other than the row's. [m]"""
+        way, along = int(motion.way(slice(row, row + 1))[0]), float(motion.s[row]) if s is None else s
+        return cls(int(motion.road[row]), int(motion.lane[row]), way, along, motion.box.center_x, motion.box.length)
+
+
+class RoadLanes:
+    """Driving lanes of a road network: a piece is one in one lane section."""
+
+    def __init__(self, network: RoadNetwork) -> None:
+        self.network = network
+        places, ends, forward = list[tuple[int, int]](), list[tuple[float, float]](), list[bool]()
+        for index, road in enumerate(network.roads):
+            for section in road.sections:
+                for lane in section.lanes:
+                    if lane.type in DRIVING:
+                        places.append((index, lane.id))
+                        ends.append((section.start, section.end))
+                        forward.append(network.travel_direction(index, lane.id) > 0)
+        self._road, self._lane = np.array(places, dtype=np.int64).reshape(-1, 2).T
+        (self._start, self._end), self._forward = np.array(ends).reshape(-1, 2).T, np.array(forward, dtype=np.bool_)
+        self._most = int(np.abs(self._lane).max(initial=0)) + 1
+        keys = self._keys(self._road, self._lane, 0.5 * (self._start + self._end))
+        self._order = np.argsort(keys, kind="stable")
+        self._sorted = keys[self._order]
+
+    def _keys(self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray) -> IntArray:
+        lane = np.where(np.abs(lane) < self._most, lane, self._most)
+        return np.asarray(self.network.section_numbers(road, s), dtype=np.int64) * (2 * self._most + 1) + lane
+
+    def place(self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Piece of each place, -1: in none, and how far along it in its direction of travel [m]; shape (n,)."""
+        if not len(self._sorted):
+            return np.full(len(s), -1), np.zeros(len(s))
+        keys = self._keys(road, lane, s)
+        at = np.minimum(np.searchsorted(self._sorted, keys), len(self._sorted) - 1)
+        piece = np.where(self._sorted[at] == keys, self._order[at], -1)
+        return piece, np.where(self._forward[piece], s - self._start[piece], self._end[piece] - s)
+
+    @cached_property
+    def graph(self) -> LaneGraph:
+        """How they hang together."""
+        road, lane, way = self._road, self._lane, np.where(self._forward, 1, -1)
+        middles = 0.5 * (self._start + self._end)
+        others = np.array([beside(*pair) for pair in zip(lane.tolist(), way.tolist(), strict=True)], dtype=np.int64)
+        left, _ = self.place(road, others, middles)
+        same = [
+            self.network.travel_direction(*pair) == mine
+            for *pair, mine in zip(road.tolist(), others.tolist(), way.tolist(), strict=True)
+        ]
+        following = list[list[int]]()
+        for number, forward in enumerate(self._forward.tolist()):
+            end = self._end[number] - INTO_NEXT if forward else self._start[number] + INTO_NEXT
+            step = self.network.advance(int(road[number]), int(lane[number]), float(end), 2 * INTO_NEXT)
+            ahead, _ = self.place(*(np.array([each]) for each in (step.road, step.lane, step.s)))
+            following.append([int(ahead[0])] if step.remaining <= 0.0 and ahead[0] not in (-1, number) else [])
+        return LaneGraph(self._end - self._start, np.where(same, left, -1), following)
+
+    def stations(
+        self, road: NDArray[np.integer], lane: NDArray[np.integer], s: FloatArray, way: IntArray
+    ) -> tuple[IntArray, IntArray, FloatArray]:
+        """Places, shape (n,): line, of lanes that hang together and vehicles that drive there the same way, -1: in no
+        driving lane; lane of it, growing to the left of their travel; station, growing as they drive [m].
+        """
+        piece, along = self.place(road, lane, s)
+        part, station, rank, _ = self.graph.stations(np.maximum(piece, 0), along)
+        return np.where(piece >= 0, 2 * part + (way < 0), -1), way * rank, way * station
+
+    def nearest(self, vehicles: Sequence[At], number: int, lane: int | None = None) -> list[tuple[int, float] | None]:
+        """Who is next ahead of one of the vehicles, and behind, of those that drive the same way, in its lane or
+        another of its road: number and free space [m]; None: nobody."""
+        every = [*vehicles, vehicles[number]._replace(lane=vehicles[number].lane if lane is None else lane)]
+        road, lanes, way, s, ahead, length = map(np.array, zip(*every, strict=True))
+        line, rank, station = self.stations(road, lanes, s, way)
+        group, middle = in_groups(line, rank - rank.min()), station + ahead
+        others = np.delete(np.arange(len(vehicles)), number)
+        order = Order(group[others], middle[others])
+        next_to = list[tuple[int, float] | None]()
+        for is_ahead in (True, False):
+            (row,) = order.next_to(group[-1:], middle[-1:], is_ahead=is_ahead).tolist()
+            if row < 0:
+                next_to.append(None)
+                continue
+            k = int(others[row])
+            free = max(abs(float(middle[k] - middle[-1])) - 0.5 * float(length[k] + length[-1]), 0.0)
+            next_to.append((k, free))
+        return next_to
+
+
+MOST_LANES = 64  # beside one another [-]
+
+
+def in_groups(frame: IntArray, lane: IntArray) -> IntArray:
+    """Number of the lane at the instant and on the part of the road of a frame; -1: in none. Shape (n,)."""
+    return np.where(frame >= 0, frame * MOST_LANES + lane, -1)
+
+
+class Order:
+    """Vehicles in order along the lanes that they are in: rows by group and place, shape (n,). [m]"""
+
+    def __init__(self, group: IntArray, place: FloatArray) -> None:
+        self._group, self._rows = group, np.lexsort((place, group))
+        # One sorted axis for all groups: each gets its own, far apart from the next.
+        self._span = float(np.ptp(place)) + 4.0 * (NEIGHBOUR_DISTANCE + MAXIMUM_LENGTH) if len(place) else 1.0
+        self._base = float(place.min()) if len(place) else 0.0
+        self._axis = self._on_axis(group[self._rows], place[self._rows])
+
+    def _on_axis(self, group: IntArray, place: FloatArray) -> FloatArray:
+        return group * self._span + (place - self._base)
+
+    def next_to(self, group: IntArray, place: FloatArray, *, is_ahead: bool) -> IntArray:
+        """Row of the first one ahead of each place in a group, or of the last one that is not; -1: nobody."""
+        if not len(self._rows):
+            return np.full(len(group), -1)
+        at = np.searchsorted(self._axis, self._on_axis(group, place), side="right") - (0 if is_ahead else 1)
+        inside = (at >= 0) & (at < len(self._rows))
+        other = self._rows[np.clip(at, 0, len(self._rows) - 1)]
+        return np.where(inside & (self._group[other] == group) & (group >= 0), other, -1)
+
+
+SLOPE_LENGTH = 10.0  # to each side: over which metres of a lane are compared with those of its neighbour [m]
+
+
+def follow(values: FloatArray, line: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Values through a line of (from, to), which goes on beyond its ends with slope 1. Shape as `values`."""
+    low, high = line[0][0], line[0][-1]
+    beyond = np.minimum(values - low, 0.0) + np.maximum(values - high, 0.0)
+    return np.asarray(np.interp(values, *line) + beyond)
+
+
+def neighbour_columns(
+    graph: LaneGraph,
+    piece: IntArray,
+    middle: FloatArray,
+    time: FloatArray,
+    vehicle: IntArray,
+    step: float,
+    speed: FloatArray,
+    length: FloatArray,
+    is_truck: BoolArray,
+    *,
+    scale: FloatArray | float = 1.0,
+) -> dict[str, FloatArray]:
+    """Columns of leader and neighbours, see `find_neighbours`, at every instant, whoever misses a frame included.
+
+    Rows sorted by vehicle and time, shape (n,); `piece`: -1: in no lane; `middle`: of the vehicle, along its piece. [m]
+    `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]
+    """
+    inside, piece = piece >= 0, np.maximum(piece, 0)
+    part, station, rank, own_scale = graph.stations(piece, middle)
+    scale = own_scale * scale
+    rank = np.where(inside, rank - int(rank.min()), -1)
+    line = np.where(inside, part, -1)
+    row_of, instant, moved, place = at_instants(station, line, speed / scale, time, vehicle, step)
+    del station, line, inside
+    on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
+    on_right[graph.left[on_left]] = True
+    columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
+    begin, n = 0, len(by_time)
+    while begin < n:  # as many instants at a time as have some rows
+        last = instant[by_time[min(begin + BLOCK, n) - 1]]
+        end = int(np.searchsorted(instant, last, side="right", sorter=by_time))
+        rows = by_time[begin:end]
+        row, begin = row_of[rows], end
+        near = find_neighbours(
+            instant[rows] * parts + part[row], rank[row], moved[rows], length[row], is_truck[row],
+            lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
+        )  # fmt: skip
+        for name, values in near.items():
+            columns.setdefault(name, np.empty(n))[rows] = values
+    del row_of, instant, moved, by_time
+    return {name: columns.pop(name)[place] for name in list(columns)}
+
+
+NEIGHBOUR_DISTANCE = 200.0  # [m]; who is farther away is none, as in `surroundings.around`
+MAXIMUM_LENGTH = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
+
+
+def find_neighbours(
+    frame: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    length: FloatArray,
+    is_truck: BoolArray,
+    *,
+    lane_on_left: BoolArray,
+    lane_on_right: BoolArray,
+    scale: FloatArray | float = 1.0,
+) -> dict[str, FloatArray]:
+    """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
+
+    Distances are free space along the road, 0 while side by side; infinite: nobody is near, NaN: no such lane. [m]
+    `frame`: equal for rows of one instant and carriageway. `lane`: 0 = rightmost driving lane, counting up to the left;
+    negative: in none. `s`: vehicle centres, growing in the direction of travel. [m]
+    `scale`: metres along the own lane per metre of `s`. [-]
+    """
+    known = lane >= 0
+    group = in_groups(np.where(known, frame, -1), lane)
+    order = Order(group, s)
+
+    def nearest(aside: int, there: BoolArray, back: BoolArray) -> tuple[FloatArray, FloatArray]:
+        best, truck = np.full(len(s), np.inf), np.zeros(len(s))
+        for is_ahead in (True, False) if aside else (True,):
+            other = order.next_to(np.where(known, group + aside, -1), s, is_ahead=is_ahead)
+            free = np.maximum(scale * np.abs(s[other] - s) - 0.5 * (length[other] + length), 0.0)
+            # a ramp's lane lies beside nothing before it comes in
+            gap = np.where((other >= 0) & (there | back[other]), free, np.inf)
+            closer = (gap < best) & (gap <= NEIGHBOUR_DISTANCE)
+            best, truck = np.where(closer, gap, best), np.where(closer, is_truck[other], truck)
+        return np.where(there & known | np.isfinite(best), best, np.nan), truck
+
+    lead, lead_is_truck = nearest(0, known, known)
+    left, left_is_truck = nearest(1, lane_on_left, lane_on_right)
+    right, right_is_truck = nearest(-1, lane_on_right, lane_on_left)
+    return {
+        "lead_distance": lead, "lead_is_truck": lead_is_truck, "left_distance": left, "left_is_truck": left_is_truck,
+        "right_distance": right, "right_is_truck": right_is_truck,
+    }  # fmt: skip
+
+
+STAMP_DISTANCE = 0.25  # stamps farther apart than this are of two instants ... [steps]
+INSTANT_WIDTH = 0.5  # ... if no instant is then wider; else every vehicle has a clock of its own [steps]
+FIRST_STEPS = 100  # a common clock is fitted to so many steps first, then to twice as many: never off by half a step
+
+
+def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray, FloatArray]:
+    """Number of each row's instant, counted up from 0, and its time, shape (n,); `step`: median of a vehicle. [s]"""
+    stamps, at = np.unique(time, return_inverse=True)
+    new = np.r_[True, np.diff(stamps) > STAMP_DISTANCE * step]
+    number = np.cumsum(new) - 1
+    first = stamps[new]
+    if (np.r_[stamps[:-1][new[1:]], stamps[-1]] - first <= INSTANT_WIDTH * step).all():
+        return number[at], first[number][at]
+    step, start = _clock(time, vehicle, step)
+    number = np.round((time - start) / step).astype(np.int64)
+    return number - number.min(), start + step * number
+
+
+def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, float]:
+    """Step and time of instant 0 of the even clock that fits all stamps best. [s]"""
+    passed = np.diff(time)[np.diff(vehicle) == 0]
+    count = np.round(passed / step)
+    near = (count >= 1.0) & (count <= 3.0)
+    step = float(passed[near].sum() / count[near].sum())
+    start, span = float(time.min()), FIRST_STEPS * step
+    begin = start
+    while True:
+        rows = time <= begin + span
+        number = np.round((time[rows] - start) / step)
+        if np.ptp(number) > 0.0:
+            step, start = np.polyfit(number, time[rows], 1).tolist()
+        if rows.all():
+            return step, start
+        span *= 2.0
+
+
+def at_instants(
+    along: FloatArray, part: IntArray, speed: FloatArray, time: FloatArray, vehicle: IntArray, step: float
+) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+    """Every vehicle at every instant from its first to its last, those too that it misses for at most `MAX_GAP`.
+
+    Row of the recording, or the last one before; number of the instant; way along the road there: between two rows of
+    one part of the road, else as fast as before [m]; and place of each row of the recording among these, shape (n,).
+    """
+    instant, when = instants(time, vehicle, step)
+    new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
+    row = np.flatnonzero(new)
+    missing = np.r_[np.diff(instant[row]) - 1, 0]
+    passed = np.r_[np.diff(time[row]), 0.0]
+    missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= MAX_GAP + 1e-9), missing, 0)
+    missing = np.maximum(missing, 0)
+    last, following = np.repeat(row, missing), np.repeat(np.r_[row[1:], row[-1]], missing)  # about what is filled
+    after = np.arange(len(last)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
+    times = np.full(int(instant.max()) + 1, np.nan)
+    times[instant] = when
+    filled = instant[last] + after
+    known = np.isfinite(times[filled])  # nobody was seen at others
+    last, following, filled = last[known], following[known], filled[known]
+    later = times[filled] - time[last]
+    share = np.clip(later / np.maximum(time[following] - time[last], 1e-9), 0.0, 1.0)
+    between = (share > 0.0) & (part[following] == part[last])
+    way = along[last] + np.where(between, share * (along[following] - along[last]), speed[last] * later)
+    moved = along[row] + speed[row] * (when[row] - time[row])
+    return np.r_[row, last], np.r_[instant[row], filled], np.r_[moved, way], np.cumsum(new) - 1
+
+
+ENCOUNTER_DISTANCE = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
+
+
+def vehicle_ahead(
+    vehicle: EntityMotion, row: int, vehicles: Sequence[EntityMotion], lanes: RoadLanes
+) -> tuple[float, float]:
+    """Free space to the vehicle ahead in its lane [m], and how fast that gets less [m/s]; NaN: none is near."""
+    time = float(vehicle.time[row])
+    rows = [(one, int(np.searchsorted(one.time, time - 1e-9))) for one in vehicles]
+    there = [(one, k) for one, k in rows if k < len(one.time) and one.time[0] <= time + 1e-9 and one.road[k] >= 0]
+    number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
+    if number is None:
+        return np.nan, np.nan
+    ahead, _ = lanes.nearest([At.of(one, k) for one, k in there], number)
+    if ahead is None or ahead[1] >= ENCOUNTER_DISTANCE:
+        return np.nan, np.nan
+    other, other_row = there[ahead[0]]
+    return ahead[1], float(vehicle.speed[row] - other.speed[other_row])
