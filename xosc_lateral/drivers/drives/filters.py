@@ -17,6 +17,8 @@ from enum import Enum
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.smoothing import filtered as filtered
+from xosc_lateral.base.smoothing import mirrored as mirrored
 
 LEAST_ATTENUATION, GREAT_ATTENUATION = 21.0, 50.0
 """Of a rectangular window, shape 0, where Kaiser's formulas begin, and where they change. [dB]"""
@@ -59,23 +61,6 @@ def low_pass_between(passed: float, stopped: float, step: float, attenuation: fl
     nyquist = 0.5 / step
     half, beta = kaiser_design(attenuation, (stopped - passed) / nyquist)
     return low_pass(half, 0.5 * (passed + stopped) / nyquist, beta)
-
-
-def filtered(values: FloatArray, kernel: FloatArray) -> FloatArray:
-    """A series through a symmetric kernel, continued beyond its ends as by `mirrored`. Shape and unit of the values."""
-    return np.convolve(mirrored(values, len(kernel) // 2), kernel, mode="valid")
-
-
-def mirrored(values: FloatArray, rows: int) -> FloatArray:
-    """A series continued by so many rows at both ends, shape (n + 2 * rows,), for a symmetric kernel. [any unit]
-
-    Beyond each end it goes on as its mirror image through the end's point, as far as there is one, and stays there: a
-    filter without delay leaves the ends, and straight lines, where they are.
-    """
-    near = min(rows, len(values) - 1)
-    before, after = 2 * values[0] - values[near:0:-1], 2 * values[-1] - values[-2 : -near - 2 : -1]
-    extended = np.concatenate([before, values, after])
-    return np.pad(extended, rows - near, mode="edge") if near < rows else extended
 
 
 def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:

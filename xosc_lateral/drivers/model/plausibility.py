@@ -19,7 +19,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
-from xosc_lateral.drivers.drives.filters import filtered
+from xosc_lateral.base.smoothing import smoothed
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 
 if TYPE_CHECKING:
@@ -243,14 +243,7 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
         return offset, None
     width, smooth, after = MINIMUM_KERNEL_WIDTH, offset, before
     while after.excess > 1.0 and width <= MAXIMUM_KERNEL_WIDTH:
-        smooth = _smoothed(offset, width / step)
+        smooth = smoothed(offset, width / step)
         after = strain(smooth, step, speed)
         width *= 1.3
     return smooth, Bound(before, after, width / 1.3)
-
-
-def _smoothed(values: FloatArray, width: float) -> FloatArray:
-    """Gaussian smoothing, continued point-symmetrically past both ends, which stay where they are."""
-    half = min(int(np.ceil(4.0 * width)), len(values) - 1)
-    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
-    return filtered(values, kernel / kernel.sum())

@@ -35,6 +35,7 @@ from xosc_lateral.drivers.model.plausibility import MINIMUM_LANE_WIDTH
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
 from xosc_lateral.extras.live import paths
+from xosc_lateral.world.motion import driver_clock
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME
 
 USUAL_INPUTS = {"speed": 30.0, "lane_count": 2.0, "friction": 1.0}
@@ -99,11 +100,13 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "OWN_LANE_WIDTH": profile.lane_width, "WIDEST_LANE": np.inf if measured is None else measured[1],
         "FINE_WIDTH": fine_width, "RATED": int(rated), "LOG_LIMIT": LOG_LIMIT, "LONGEST_PAUSE": LIVE_PAUSE.value,
         "LATEST_TIME": TIME.value, "FARTHEST_POSITION": LIVE_RANGES["offset"].high, "MINIMUM_SPEED": MINIMUM_SPEED,
-        "SETTLING_TIME": SETTLING_TIME, "LARGEST_TURN": paths.LEADING_OVER_SHARE * paths.LARGEST_TURN_RATE,
+        "SETTLING_TIME": SETTLING_TIME,
+        "LARGEST_TURN": driver_clock.LEADING_OVER_SHARE * driver_clock.LARGEST_TURN_RATE,
         "OFFSET_LANES": OFFSET_LANES.value, "MINIMUM_LANE_WIDTH": MINIMUM_LANE_WIDTH,
         **{name: getattr(actuator, name) for name in ("RESPONSE_SPEED", "RESPONSE_ACCELERATION", "LARGEST_SPEED",
                                                       "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
-        "STEP_PEAK": paths.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST, "LARGEST_SINE": paths.LARGEST_SINE,
+        "STEP_PEAK": driver_clock.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
+        "LARGEST_SINE": paths.LARGEST_SINE,
         "HALF_RATE_SPEED": HALF_RATE_SPEED, "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip

@@ -20,13 +20,14 @@ from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.esmini_places import Ledger, Place, Rest, ToldPlace
 from xosc_lateral.extras.live.loop import Row
-from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, leading_time, left_of_gap
+from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, left_of_gap
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.extras.live.under_test import UnderTest
 from xosc_lateral.files.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
+from xosc_lateral.world.motion.driver_clock import leading_time
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities
 from xosc_lateral.world.scenario.private_actions import (
     FollowTrajectoryAction,

@@ -14,18 +14,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.own_clock import LARGEST_HEADING, clock_rate, is_slow, way_of
-from xosc_lateral.base.segment import MINIMUM_SPEED
-from xosc_lateral.world.motion.trajectory import SETTLING_TIME, settle, smoother_step
+from xosc_lateral.world.motion.driver_clock import leading_time
+from xosc_lateral.world.motion.trajectory import settle, smoother_step
 from xosc_lateral.world.surroundings.context import STEERING_DURATION
-
-LARGEST_TURN_RATE = 0.03
-"""Change of heading per time that nobody takes for a corner of the path: 0.3 mrad in a step of 0.01 s. [rad/s]"""
-
-LEADING_OVER_SHARE = 0.5
-"""Part of `LARGEST_TURN_RATE` that leading over to the path may take; the driver's own movement has the rest. [-]"""
-
-STEP_PEAK = 10.0 / np.sqrt(3.0)
-"""Largest second derivative of the smooth step from 0 to 1 in unit time (of 10 u^3 - 15 u^4 + 6 u^5, by hand). [-]"""
 
 STANDSTILL = 0.1
 """Below this speed a path has no direction. [m/s]"""
@@ -140,13 +131,6 @@ def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: Flo
     over = leading_time(gap, rate, speed)
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])
-
-
-def leading_time(gap: FloatArray, rate: FloatArray, speed: FloatArray) -> FloatArray:
-    """How long that takes, shape (n,). [s]"""
-    bound = LEADING_OVER_SHARE * LARGEST_TURN_RATE * np.maximum(np.abs(speed), MINIMUM_SPEED)
-    ways = np.maximum(np.sqrt(STEP_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound)
-    return np.asarray(np.maximum(SETTLING_TIME, ways))
 
 
 def left_of_gap(u: FloatArray, over: FloatArray, gap: FloatArray, rate: FloatArray) -> FloatArray:

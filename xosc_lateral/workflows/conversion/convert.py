@@ -139,7 +139,7 @@ def carry_out(plan: Plan) -> Conversion:
     checked = check(plan, write(plan, sampled, lifelike=lifelike))
     across = {path.entity for path in checked.paths if path.instead}
     if across and checked.otherwise:
-        plain = check(plan, write(plan, sampled, lifelike=False))
+        plain = check(plan, write(plan, sampled, lifelike=True, leads=False))
         why = "with the way that drivers take, what happens would happen otherwise"
         if plain.otherwise < checked.otherwise:
             lines = (f"lane changes of '{name}' stay as written: {why}" for name in sorted(across))

@@ -27,7 +27,6 @@ from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Co
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
-from xosc_lateral.world.motion.trajectory import distance_driven
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
 from xosc_lateral.world.scenario.enums import (
@@ -106,9 +105,9 @@ class EventEquivalence:
         return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before))
 
     def farthest(self, name: str) -> float:
-        """Distance that an entity may drive in that time, as fast as in the run in which it is fastest. [m]"""
+        """Distance that an entity may drive in that time, as fast as it ever is in a run. [m]"""
         runs = (one for _, motion in self._before for one in motion.entities if one.name == name)
-        return self.longest_time * max(float(distance_driven(one)[-1] / max(one.time[-1], self._step)) for one in runs)
+        return self.longest_time * max(float(np.abs(one.speed).max()) for one in runs)
 
     def _run(self, scenario: Scenario, k: int) -> tuple[Scenario, NominalMotion]:
         """The k-th run, and what was played; all but the nominal one in coarser steps, until nothing is left to do."""

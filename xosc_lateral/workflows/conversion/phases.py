@@ -12,31 +12,32 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.own_clock import way_of as way_of_clock
+from xosc_lateral.base.own_clock import within_heading
 from xosc_lateral.drivers.drives.resampling import STEP
-from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT
-from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept
+from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT, REACHED
+from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept, why_untouched
 from xosc_lateral.workflows.conversion.consequences import stays_as_written
 from xosc_lateral.workflows.conversion.movement import DRIVING_SPEED
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
+from xosc_lateral.world.motion.driver_clock import DriverClock
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.offset_path import (
-    APPROACH_TIME,
-    SETTLING_LENGTH,
+    LEAST_GAP,
+    SHORTEST_GAP,
     Bridge,
     Offset,
     OffsetPath,
     PathPiece,
     Spacing,
     approached,
+    bounded,
     calm,
     pieces_along,
     spacing_of,
 )
 from xosc_lateral.world.motion.segments import (
     Crossing,
-    bell_share,
-    bell_time,
     crossings,
     leads_left,
     movement_runs,
@@ -50,29 +51,30 @@ from xosc_lateral.world.scenario.private_actions import (
     AssignRouteAction,
     FollowTrajectoryAction,
     LaneChangeAction,
+    LaneOffsetAction,
 )
 
+LEAST_MOVE = 1e-3
+"""An action that moves by less is already there. [m]"""
 LEAST_LENGTH = 20.0
 """A shorter path is none: it would hardly leave where it begins. [m]"""
-BRIDGE_START, BRIDGE_TIME = 2.0, 0.1
-"""The first place of a bridge is so far ahead, and as far as is driven in two frames of 0.05 s. [m], [s]"""
+BRIDGE_TIME, GRADE = 0.1, 1.6
+"""From where it follows its road to its first place in the world is as far as is driven in two frames of 0.05 s [s];
+pieces grow to there and shrink behind by this factor [-]: a player turns a vehicle within half a piece of each corner.
+"""
 BRIDGE_END = 5.0
 """It ends so far before the place where the next path begins. [m]"""
 Path = tuple[str, ...]
 """Names of an action from the story down."""
 
 
-SETTLED = 0.5 * APPROACH_TIME
-"""In which a driver whose offset in the new lane is not known is led to it: 0.3 m then take 0.1 m/s2. [s]"""
-
-
-def paths_of(entity: EntityResult, plan: Plan, *, lifelike: bool) -> tuple[list[OffsetPath], list[str]]:
+def paths_of(entity: EntityResult, plan: Plan, *, lifelike: bool, leads: bool) -> tuple[list[OffsetPath], list[str]]:
     """Paths of one entity; none where a controller moves it along, which a path would double.
 
     `lifelike`: lane changes lead across as drivers take them, where they can. And which of them stay as written, a line
     each.
     """
-    phases = _Phases(entity, plan, lifelike=lifelike)
+    phases = _Phases(entity, plan, lifelike=lifelike, leads=leads)
     actions = plan.lateral.by_entity.get(entity.name, ())
     is_moved_along = Domains.LONGITUDINAL in plan.lateral.controlled.get(entity.name, Domains.NONE)
     paths = list[OffsetPath | None]()
@@ -86,40 +88,51 @@ def paths_of(entity: EntityResult, plan: Plan, *, lifelike: bool) -> tuple[list[
             paths.append(phases.after(action.path))
     if not is_moved_along:
         paths += phases.across.values()
+        paths += phases.already_there()
     return [path for path in paths if path is not None], phases.stays
 
 
 class _Phases:
     """Of one entity, with the offsets that it has in the nominal run there, or else with its longest ones."""
 
-    def __init__(self, entity: EntityResult, plan: Plan, *, lifelike: bool) -> None:
+    def __init__(self, entity: EntityResult, plan: Plan, *, lifelike: bool, leads: bool) -> None:
         self._entity, self._plan, self._network = entity, plan, plan.played.network
         motion = entity.motion
         self._own = [one for one in plan.extended.motion.actions if one.actor == entity.name]
         self._lateral = {one.path for one in plan.lateral.by_entity.get(entity.name, ())}
         self._driven = distance_driven(motion)
-        reach = plan.prepared.equivalence(tuple(plan.egos)).farthest(entity.name)
+        runs = plan.prepared.equivalence(tuple(plan.egos))
+        reach = runs.farthest(entity.name)
         has_route = any(isinstance(one.action.content, AssignRouteAction | AcquirePositionAction) for one in self._own)
         self._way = way_of(motion, self._network, reach, has_route=has_route)
-        self._offset = deviation_through(
-            [_sampled(one, motion, self._driven, is_last=one is entity.segments[-1]) for one in entity.segments]
+        self._runs = [(one, run) for _, run in runs.runs for one in run.entities if one.name == entity.name]
+        own = [motion, *(one for one, _ in self._runs)]
+        self._clock, self._clock_anywhere = (DriverClock.fastest(own, reach, anywhere=which) for which in (False, True))
+        beyond = STEP * float(way_of_clock(self._clock.speed[-1:])[0])
+        self._offset: Offset = deviation_through(
+            [
+                _sampled(one, motion, self._driven, beyond if one is entity.segments[-1] else 0.0)
+                for one in entity.segments
+            ]
         )
-        self._foreseeing = self._foreseen()
+        self._foreseeing = bounded(self._foreseen(), self._clock)
+        self._offset = bounded(self._offset, self._clock_anywhere)
         self._spacing = self._spacing_of(motion)
         self.across, self.stays, self._crossed = dict[Path, OffsetPath](), list[str](), dict[Path, float]()
         if lifelike:
-            self._find_across()
+            self._find_across(leads)
 
-    def _find_across(self) -> None:
+    def _find_across(self, leads: bool) -> None:
         """Paths in place of lane changes; lines on those that stay as written."""
         motion = self._entity.motion
         runs = movement_runs(self._plan.extended.motion, motion, self._network, self._entity.spans)
         for crossing in crossings(self._plan.extended.motion, motion, runs):
-            if why := crossing.stays or self._kept_for(crossing):
+            fixed = why_untouched(self._plan.played.scenario, crossing.path, motion.name)
+            if why := fixed or crossing.stays or self._kept_for(crossing):
                 self.stays.append(stays_as_written(motion, crossing, why))
-            else:
-                self._crossed[crossing.path] = self._driven_at(sum(bell_time(motion, crossing)))
-                self.across[crossing.path] = self._across(crossing)
+            self._crossed[crossing.path] = float(self._driven[crossing.last])
+            if not fixed:
+                self.across[crossing.path] = self._to_aside(crossing) if why or not leads else self._across(crossing)
         written = lane_changes_of(self._plan.played.scenario, motion.name)
         for path in sorted(written.keys() - {one.path for one in self._own}):
             what = f"lane change '{path[-1]}' of '{motion.name}'"
@@ -129,29 +142,34 @@ class _Phases:
         """Why the player has to take it as written; empty: a path can lead across."""
         motion, begin = self._entity.motion, float(self._driven[crossing.first])
         ahead = self._way.next_break(begin)
-        if not crossing.is_lane_change:
-            return "the player takes it"
         if motion.speed[crossing.first : crossing.last + 1].min() < DRIVING_SPEED:
             return "it is slow meanwhile"
-        if ahead is not None and ahead.distance < self._driven_at(sum(bell_time(motion, crossing))) + END_MARGIN:
+        if ahead is not None and ahead.distance < self._driven[crossing.last] + END_MARGIN:
             return f"no path leads over what is ahead ({ahead.why})"
         return why_kept(self._plan.played.scenario, crossing.path, motion.name)
 
+    def _to_aside(self, crossing: Crossing) -> OffsetPath:
+        """As written, but for its end: there the driver drives beside the middle."""
+        motion, row, last = self._entity.motion, crossing.last, self._crossed[crossing.path]
+        aside, side = float(self._offset(np.array([last]))[0]), self._way.side_at(last)
+        direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
+        there = direction * float(motion.offset[row]) + side * aside
+        return OffsetPath(motion.name, crossing.path, (), side, end=aside, instead=True, settles=(there, 0.0))
+
     def _across(self, crossing: Crossing) -> OffsetPath:
-        """By the distance driven: whoever is slower than in the nominal run takes longer."""
-        motion, (begin, duration) = self._entity.motion, bell_time(self._entity.motion, crossing)
-        known = crossing.path not in self._plan.depends.begins
-        offset = self._foreseeing if known else self._offset
-        first, last = float(self._driven[crossing.first]), self._crossed[crossing.path]
-        lead_in = float(bell_share(np.clip((motion.time[crossing.first] - begin) / duration, 0.0, 1.0)))
+        """By the distance driven; over when the written way is: the bell's last centimetres are left for later."""
+        motion, (first, last) = self._entity.motion, self._driven[[crossing.first, crossing.last]].tolist()
+        clock = self._clock_anywhere if crossing.path in self._plan.depends.begins else self._clock
+        rows, at_first = slice(crossing.first, crossing.last + 1), np.array([first])
+        aside = bounded(lambda at: np.interp(at, self._driven, self._entity.deviation), clock)
+        before = float((aside(at_first) - self._offset(at_first))[0])  # the bell's, not driven yet
 
         def way(distance: FloatArray) -> FloatArray:
-            time = np.interp(distance, self._driven, motion.time)
-            done = bell_share(np.clip((time - begin) / duration, 0.0, 1.0))
-            return np.asarray(offset(distance) + crossing.way[-1] * (done - lead_in) / (1.0 - lead_in))
+            across = np.interp(distance, self._driven[rows], crossing.way)
+            return np.asarray(aside(distance) + across - before * (1.0 - across / crossing.way[-1]))
 
-        pieces = tuple(pieces_along(way, self._spacing, (first, last), calm_end=True))
-        end = float(offset(np.array([last]))[0])
+        pieces = tuple(pieces_along(way, clock, self._spacing, (first, last), calm_end=True))
+        end = float(way(np.array([last]))[0] - crossing.way[-1])
         return OffsetPath(motion.name, crossing.path, pieces, self._way.side_at(first), end=end, instead=True)
 
     def _foreseen(self) -> Offset:
@@ -204,15 +222,35 @@ class _Phases:
     def _settled(self, action: Path) -> OffsetPath | None:
         """From the end of a path across on, where its driver is by then: known if it began where it nominally does."""
         motion, depends, begin = self._entity.motion, self._plan.depends, self._crossed[action]
-        if action not in depends.begins and motion.name not in depends.entities:
+        leads = self.across[action].settles is None
+        if not leads or (action not in depends.begins and motion.name not in depends.entities):
             return self._path(action, begin, self.across[action].end)
-        length = max(SETTLED * self._speed_at(begin), SETTLING_LENGTH)
+        length = SETTLING_TIME * float(way_of_clock(np.array([self._speed_at(begin)]))[0])
         aside = float(self._offset(np.array([begin + length]))[0])
         path = self._path(action, begin + length, aside)
         row = min(int(np.searchsorted(self._driven, begin)), len(motion.time) - 1)
         direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
         there = direction * float(motion.offset[row]) + self._way.side_at(begin) * aside
         return path if path is None else structs.replace(path, settles=(there, length))
+
+    def already_there(self) -> Iterator[OffsetPath]:
+        """What ends actions of the source that are over at once in one of its runs, after the same ones as there."""
+        found = dict[tuple[Path, Path | None], set[Path]]()
+        for entity, run in self._runs:
+            own = sorted((one for one in run.actions if one.path in self._lateral), key=lambda one: one.start)
+            own = [one for one in own if one.actor == entity.name]
+            for k, one in enumerate(own):
+                rows = np.searchsorted(entity.time, (one.start - run.step, one.end or np.inf))
+                is_short = isinstance(one.action.content, LaneChangeAction | LaneOffsetAction) and rows[1] - rows[0] < 4
+                places = [column[rows] for column in (entity.lane, entity.offset)] if is_short else [np.arange(2.0)]
+                if all(abs(first - last) < LEAST_MOVE for first, last in places):
+                    before = [earlier.path for earlier in own[:k]]
+                    found[one.path, before[-1] if before else None] = {*before, one.path}
+        at = np.arange(0.0, LEAST_LENGTH, SHORTEST_GAP)
+        straight = (PathPiece(at, np.zeros(len(at))),)
+        for (path, after), begun in found.items():
+            unless = tuple(sorted(self._lateral - begun))
+            yield OffsetPath(self._entity.name, after, straight, over=path, unless=unless)
 
     def behind_breaks(self, first: OffsetPath | None) -> Iterator[OffsetPath]:
         """From places on; each keeps the offset that the path before ended with, as long as no action is between."""
@@ -221,7 +259,7 @@ class _Phases:
         for way_break in self._way.breaks:
             if any(at < way_break.behind for at in actions):
                 known = None
-            path = self._path(None, way_break.behind, known) if way_break.lanes else None
+            path = self._path(None, way_break.behind - REACHED, known) if way_break.lanes else None
             if path is not None:
                 known = None if known is None else path.end
                 yield structs.replace(path, places=way_break.lanes)
@@ -246,11 +284,13 @@ class _Phases:
         trajectories = (one.path for one in lateral if isinstance(one.action.content, FollowTrajectoryAction))
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
         offset: Offset = self._foreseeing if is_known else self._offset
+        clock = self._clock if is_known else self._clock_anywhere
         if start is not None:
-            offset = approached(offset, begin, start, APPROACH_TIME * self._speed_at(begin))
+            offset = approached(offset, clock, begin, start)
             if cut in cuts and any(actions[path] == cut for path in trajectories):  # which starts without an offset
-                offset = approached(offset, cut, 0.0, -APPROACH_TIME * self._speed_at(cut))
-        pieces: list[PathPiece | Bridge] = list(pieces_along(offset, self._spacing, cuts, calm_end=ahead is not None))
+                offset = approached(offset, clock, cut, 0.0, back=True)
+        along = pieces_along(offset, clock, self._spacing, cuts, calm_end=ahead is not None)
+        pieces: list[PathPiece | Bridge] = list(along)
         is_followed = ahead is not None and ahead.lanes and ahead.why != LANE_ENDS and start is not None
         if ahead is not None and is_followed and not any(begin < at < ahead.behind for at in actions.values()):
             end = ahead.behind - BRIDGE_END
@@ -264,9 +304,17 @@ class _Phases:
 
     def _bridge(self, offset: Offset, over: Break, end: float, late: float) -> Bridge:
         """Over a place that no other path leads over: the lane of the nominal way is known, without actions before."""
-        at = self._spacing.between(over.distance - END_MARGIN, end)
-        rows, aside = at >= at[0] + BRIDGE_START + late * self._speed_at(float(at[0])), calm(offset, at)
-        return Bridge(*self._way.points(self._network, at[rows], aside[rows]))
+        begin = over.distance - END_MARGIN
+        speed, fastest = self._speed_at(begin), self._clock.speed_at(begin)
+        gap = LEAST_GAP + late * fastest + FIRST_WAIT * (fastest - speed)
+        graded = np.cumsum(gap / GRADE ** np.arange(1.0, 1.5 + np.log(gap / LEAST_GAP) / np.log(GRADE)))
+        near = np.concatenate(([0.0], graded[-1] - graded[-2::-1], graded[-1:]))
+        at = self._spacing.between(begin + near[-1] + gap + graded[-1], end)
+        at = begin + np.concatenate((near, near[-1] + gap + np.append(0.0, graded[:-1]), at - begin))
+        aside, n = calm(offset, self._clock, at), len(near)
+        along = np.interp(at[:n], self._spacing.distance, self._spacing.along)
+        beside = PathPiece(along - along[0], aside[:n] - aside[0])
+        return Bridge(beside, *self._way.points(self._network, at[n:], aside[n:]))
 
     def _speed_at(self, distance: float) -> float:
         return float(np.interp(distance, self._driven, np.abs(self._entity.motion.speed)))
@@ -278,19 +326,21 @@ class _Phases:
         distance, rows = np.unique(self._way.distance, return_index=True)
         places = (column[rows] for column in (self._way.road, self._way.lane, self._way.s))
         return spacing_of(
-            distance, np.interp(distance, self._driven, motion.speed), self._network.lane_curvature(*places)
+            distance,
+            np.interp(distance, self._driven, motion.speed),
+            self._network.lane_curvature(*places),
+            self._way.along(distance),
+            self._clock,
         )
 
 
-def _sampled(segment: SampledSegment, motion: EntityMotion, driven: FloatArray, *, is_last: bool) -> SampledDeviation:
-    """One segment by the distance driven; the last one with what was sampled beyond it, at its usual speed."""
+def _sampled(segment: SampledSegment, motion: EntityMotion, driven: FloatArray, beyond: float) -> SampledDeviation:
+    """One segment by the distance driven; the last one with what was sampled beyond it, so far from one to the next."""
     distance, offset = segment.distance, segment.offset
     if distance is None:
         distance = np.interp(segment.time, motion.time, driven)
-    settling = SETTLING_TIME * motion.speed[[segment.span.first, segment.span.last]]
-    if is_last and len(segment.beyond):
-        usual = float(np.median(np.abs(motion.speed[segment.span.first : segment.span.last + 1])))
-        step = STEP * float(way_of_clock(np.array([usual]))[0])
-        distance = np.append(distance, distance[-1] + step * np.arange(1, len(segment.beyond) + 1))
+    settling = SETTLING_TIME * way_of_clock(motion.speed[[segment.span.first, segment.span.last]])
+    if beyond and len(segment.beyond):
+        distance = np.append(distance, distance[-1] + beyond * np.arange(1, len(segment.beyond) + 1))
         offset = np.append(offset, segment.beyond)
-    return SampledDeviation(distance, offset, (float(settling[0]), float(settling[1])))
+    return SampledDeviation(distance, within_heading(offset, distance), (float(settling[0]), float(settling[1])))

@@ -134,6 +134,7 @@ def decide(
     drivers = choose_drivers(scenario, settings, egos, left)
     continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
     version = target.version_for(scenario)
+    is_lifelike = settings.lane_changes is LaneChanges.LIFELIKE
     plan = Plan(
         settings,
         variant_index,
@@ -149,12 +150,12 @@ def decide(
         depends,
         _is_replay(settings, depends),
         _without_proving_grounds(drivers, played.motion, played.network, settings.entity),
-        continuous,
+        frozenset(drivers) if is_lifelike else continuous,
         context,
         _unwritable(played, settings, version, {*egos, *controllers}),
         lateral,
     )
-    for at in scenario.storyboard.events() if settings.lane_changes is LaneChanges.LIFELIKE else ():
+    for at in scenario.storyboard.events() if is_lifelike else ():
         for content in (action.content for action in at.event.actions):
             is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
             if is_step and set(at.actors) & continuous:

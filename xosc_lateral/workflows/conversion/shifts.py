@@ -31,7 +31,6 @@ from xosc_lateral.world.scenario.dependence import entity_references, refers_to
 from xosc_lateral.world.scenario.enums import DynamicsDimension, StoryboardElementState
 from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
-    FollowTrajectoryAction,
     LaneChangeAction,
     LaneOffsetAction,
     LateralDistanceAction,
@@ -235,13 +234,10 @@ class _Shifts:
         return causes if causes and not others else [*causes, 0.0]
 
     def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
-        """By how much longer the action may last for its way; a path in its place, for as long as it will. [s]"""
+        """By how much longer the action may last for its way. [s]"""
         powers = _powers(then)
         duration = (then.end or 0.0) - then.start
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
-        is_path = isinstance(now.action.content, FollowTrajectoryAction) and isinstance(then.action.content, LATERAL)
-        if is_path or ways[0] < LEAST_WAY <= ways[1]:  # over at once from the middle; from beside it, it takes its time
-            return [(now.end or 0.0) - now.start - duration]
         if not powers or min(ways) < LEAST_WAY:
             return [0.0]
         return [duration * ((ways[1] / ways[0]) ** power - 1.0) for power in powers]

@@ -41,10 +41,11 @@ class Written:
         return frozenset(path.entity for path in self.paths)
 
 
-def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
+def write(plan: Plan, sampled: Enriched, *, lifelike: bool, leads: bool = True) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked.
 
-    `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can.
+    `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can; `leads`: not only
+    where they end.
     """
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
     place = leads_from(plan.source, plan.output).parent
@@ -67,7 +68,7 @@ def write(plan: Plan, sampled: Enriched, *, lifelike: bool) -> Written:
         content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    phases = [paths_of(entity, plan, lifelike=lifelike) for entity in reactive]
+    phases = [paths_of(entity, plan, lifelike=lifelike, leads=leads) for entity in reactive]
     written = write_with([path for paths, _ in phases for path in paths], plan, sampled, vehicles, provenance)
     return replace(written, stays=tuple(line for _, lines in phases for line in lines))
 

@@ -17,22 +17,25 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.world.motion.trajectory import settle, smoother_step
+from xosc_lateral.base.own_clock import within_heading
+from xosc_lateral.base.smoothing import smoothed
+from xosc_lateral.world.motion.driver_clock import TICK, DriverClock, leading_time
+from xosc_lateral.world.motion.trajectory import NaturalSpline, settle, smoother_step
 from xosc_lateral.world.motion.way import RoadPlace
 
-SETTLING_LENGTH = 60.0
-"""In which a path takes up its lateral speed, and gives it up again where its end is known. [m]"""
-APPROACH_TIME = 8.0
-"""In which it comes to where it would be from where the entity is: 0.3 m then take 0.03 m/s2. [s]"""
 LONGEST_PIECE = 4000.0
 """Longer paths are several, one after the other; each begins without lateral speed. [m]"""
 VERTEX_TIME = 0.09995
 """Between vertices, as it is driven nominally: closer ones change nothing. As in a replay, they move slowly against a
 player's frames: vertices that always lie on a frame are told from those that do not (AUC 1.00). [s]"""
 SHORTEST_GAP, LONGEST_GAP = 1.0, 4.0
-"""Between vertices. [m]"""
-CHORD_ERROR = 0.002
-"""By which straight pieces may cut a bend. [m]"""
+"""Between vertices where the road is straight. [m]"""
+CHORD_ERROR, CORNER, LEAST_GAP = 0.002, 0.008, 0.2
+"""By which straight pieces may cut a bend [m], turn from one to the next [rad], and how short they may be. [m]"""
+WIDTHS = tuple(0.2 * 1.5 ** np.arange(9))
+"""Standard deviations of the kernel by which movement is smoothed, tried in order: up to 5 s of the clock. [s]"""
+SPREAD = 2.0
+"""Times its width, around what is too hard, a kernel is used. [-]"""
 OFFSET_DECIMALS, DISTANCE_DECIMALS = 6, 3
 """With 4 decimals of an offset, a path is told from one that is not rounded (AUC 0.91). [-]"""
 
@@ -49,14 +52,15 @@ class PathPiece(NamedTuple):
 
 
 class Bridge(NamedTuple):
-    """A path over what no other leads over: from where the entity is then, to places in the world, shape (2, n). [m]"""
+    """A path over what no other leads over: along its road, then from place to place in the world, shape (2, n). [m]"""
 
+    beside: PathPiece
     nominal: FloatArray
     aside: FloatArray  # from there to where it is driven
 
     def resized(self, factor: float) -> Bridge:
         """With offsets of another size."""
-        return self._replace(aside=factor * self.aside)
+        return self._replace(beside=self.beside.resized(factor), aside=factor * self.aside)
 
 
 class OffsetPath(Struct, frozen=True, eq=False):
@@ -79,6 +83,9 @@ class OffsetPath(Struct, frozen=True, eq=False):
     instead: bool = False  # it leads to another lane, in place of the action `after`
     # settles: it is led there first, from wherever it is: so far along +t from its lane's centre, within a way [m]
     settles: tuple[float, float] | None = None
+    # over, unless: an action that it ends, since the entity is where that leads; none of those has begun before
+    over: tuple[str, ...] | None = None
+    unless: tuple[tuple[str, ...], ...] = ()
 
 
 def resized(path: OffsetPath, factor: float) -> OffsetPath:
@@ -94,10 +101,13 @@ Offset = Callable[[FloatArray], FloatArray]
 
 
 class Spacing(Struct, frozen=True, eq=False):
-    """How many vertices there are up to each distance along the way, shape (n,); both increase."""
+    """How many vertices there are up to each distance along the way, shape (n,), and how far it is along the roads'
+    reference lines; all increase.
+    """
 
     distance: FloatArray  # [m]
     count: FloatArray  # [-]
+    along: FloatArray  # [m]
 
     def between(self, first: float, last: float) -> FloatArray:
         """Distances of vertices from the first to the last, both included. [m]"""
@@ -106,41 +116,72 @@ class Spacing(Struct, frozen=True, eq=False):
         return np.concatenate(([first], np.interp(inside, self.count, self.distance), [last]))
 
 
-def spacing_of(distance: FloatArray, speed: FloatArray, curvature: FloatArray) -> Spacing:
-    """Every 0.1 s at these speeds [m/s], closer in bends [1/m], from `SHORTEST_GAP` to `LONGEST_GAP`."""
-    chord = np.sqrt(8.0 * CHORD_ERROR / np.maximum(np.abs(curvature), 1e-6))
-    gap = np.clip(np.minimum(VERTEX_TIME * np.abs(speed), chord), SHORTEST_GAP, LONGEST_GAP)
-    return Spacing(distance, np.concatenate(([0.0], np.cumsum(np.diff(distance) / gap[1:]))))
-
-
-def approached(offset: Offset, begin: float, start: float, approach: float) -> Offset:
-    """Offsets from a distance on, led to from where the entity is then, within a length; below 0: up to one, led from
-    to where the entity is to be. [m]
+def spacing_of(
+    distance: FloatArray, speed: FloatArray, curvature: FloatArray, along: FloatArray, clock: DriverClock
+) -> Spacing:
+    """Every 0.1 s at these speeds [m/s], closer where it is slow in any run, and in bends [1/m]: by the chord's
+    error in place and in direction.
     """
-    away = float(offset(np.array([begin]))[0]) - start
-    length = np.copysign(max(abs(approach), SETTLING_LENGTH), approach)
-    return lambda at: offset(at) - away * (1.0 - smoother_step((at - begin) / length))
+    bend, way = (
+        np.maximum(np.abs(curvature), 1e-6),
+        np.interp(distance, clock.distance[1:], np.diff(clock.distance) / np.diff(clock.time)),
+    )
+    by_time = np.clip(VERTEX_TIME * np.abs(speed), np.minimum(SHORTEST_GAP, VERTEX_TIME * way), LONGEST_GAP)
+    gap = np.maximum(np.minimum(by_time, np.minimum(np.sqrt(8.0 * CHORD_ERROR / bend), CORNER / bend)), LEAST_GAP)
+    return Spacing(distance, np.concatenate(([0.0], np.cumsum(np.diff(distance) / gap[1:]))), along)
 
 
-def calm(offset: Offset, at: FloatArray, *, end: bool = True) -> FloatArray:
+def bounded(offset: Offset, clock: DriverClock) -> Offset:
+    """Offsets, smoothed where they would turn the entity faster than `DriverClock.limit` in its fastest run."""
+    at = clock.ticks()
+    values, limit = offset(at), clock.limit(at)
+    ladder, level = [values], np.zeros(len(at))
+    for k, width in enumerate(WIDTHS):
+        strained = np.abs(np.diff(ladder[-1], 2, prepend=ladder[-1][:1], append=ladder[-1][-1:])) > limit * TICK**2
+        strained[[0, -1]] = False
+        if not strained.any():
+            break
+        reach = int(np.ceil(SPREAD * width / TICK))
+        level = np.where(np.convolve(strained, np.ones(2 * reach + 1), "same") > 0.5, k + 1.0, level)
+        ladder.append(smoothed(values, width / TICK))
+    if len(ladder) == 1:
+        return offset
+    level = np.clip(smoothed(level, 0.5 * SPREAD * WIDTHS[0] / TICK), 0.0, len(ladder) - 1.0)
+    below = np.minimum(level.astype(np.int64), len(ladder) - 2)
+    rows, share, stack = np.arange(len(at)), smoother_step(level - below), np.stack(ladder)
+    mixed = (1.0 - share) * stack[below, rows] + share * stack[below + 1, rows]
+    spline = NaturalSpline.natural(at, within_heading(mixed, at))
+    return lambda distance: spline(np.clip(distance, at[0], at[-1]))
+
+
+def approached(offset: Offset, clock: DriverClock, begin: float, start: float, *, back: bool = False) -> Offset:
+    """Offsets from a distance on, led to from where the entity is then; `back`: up to one, led from to where it is to
+    be then. [m]
+    """
+    away, sign = float(offset(np.array([begin]))[0]) - start, -1.0 if back else 1.0
+    length, there = leading_time(away, 0.0, clock.speed_at(begin)), clock.time_at(begin)
+    return lambda at: offset(at) - away * (1.0 - smoother_step(sign * (clock.time_at(at) - there) / length))
+
+
+def calm(offset: Offset, clock: DriverClock, at: FloatArray, *, end: bool = True) -> FloatArray:
     """Offsets at distances, shape (n,), that begin without lateral speed, and end so. [m]"""
-    room = min(SETTLING_LENGTH, 0.5 * float(at[-1] - at[0]))
-    values = offset(at) - settle(at - at[0], room, *_derivatives(offset, float(at[0])))
-    slope, bend = _derivatives(offset, float(at[-1])) if end else (0.0, 0.0)
-    return np.asarray(values - settle(at[-1] - at, room, -slope, bend))
+    time, values = clock.time_at(at), offset(at)
+    for place, sign in ((at[0], 1.0), (at[-1], -1.0))[: 2 if end else 1]:
+        before, here, behind = offset(clock.distance_at(clock.time_at(place) + TICK * np.array([-1.0, 0.0, 1.0])))
+        slope, bend = sign * 0.5 * (behind - before) / TICK, (behind - 2.0 * here + before) / TICK**2
+        room = min(leading_time(0.0, slope, clock.speed_at(place)), 0.5 * float(time[-1] - time[0]))
+        values = values - settle(sign * (time - clock.time_at(place)), room, slope, bend)
+    return np.asarray(values)
 
 
-def pieces_along(offset: Offset, spacing: Spacing, cuts: Sequence[float], *, calm_end: bool) -> Iterator[PathPiece]:
+def pieces_along(
+    offset: Offset, clock: DriverClock, spacing: Spacing, cuts: Sequence[float], *, calm_end: bool
+) -> Iterator[PathPiece]:
     """Pieces from the first of some distances to the last; without lateral speed at each but the last. [m]"""
     for first, last in pairwise(cuts):
         at = spacing.between(first, last)
-        yield from _pieces(at, calm(offset, at, end=calm_end or last < cuts[-1]))
-
-
-def _derivatives(offset: Offset, at: float) -> tuple[float, float]:
-    """Slope and second derivative. [-], [1/m]"""
-    before, here, behind = offset(np.array([at - 1.0, at, at + 1.0])).tolist()
-    return 0.5 * (behind - before), behind - 2.0 * here + before
+        values = calm(offset, clock, at, end=calm_end or last < cuts[-1])
+        yield from _pieces(np.interp(at, spacing.distance, spacing.along), values)
 
 
 def _pieces(at: FloatArray, values: FloatArray) -> Iterator[PathPiece]:

@@ -167,9 +167,9 @@ ALPHA = 1.0 + PEAK_SHARE * (CONCENTRATION - 2.0)
 BETA = CONCENTRATION - ALPHA
 TENTH, NINE_TENTHS = 0.257102, 0.699345
 """Of the bell's duration, when it has done so much of the way. [-]"""
-SHORTEST_DURATION, LONGEST_DURATION = 3.0, 13.0
+SHORTEST_DURATION, LONGEST_DURATION = 2.0, 20.0
 """Durations of actions that get the bell; below 6 s it is extrapolated. [s]"""
-LARGEST_SPEED_RATIO = 1.1
+LARGEST_SPEED_RATIO = 1.25
 """Times the written peak of lateral speed, at most. [-]"""
 
 

@@ -67,6 +67,11 @@ class Way(NamedTuple):
         nominal, there = (np.stack(point[:2]) for point in points)
         return nominal, there - nominal
 
+    def along(self, at: FloatArray) -> FloatArray:
+        """Ways along the roads' reference lines, on which bends are longer or shorter, at distances along it. [m]"""
+        steps = np.where(np.diff(self.road) == 0, np.abs(np.diff(self.s)), np.diff(self.distance))
+        return np.asarray(np.interp(at, self.distance, np.concatenate((self.distance[:1], steps)).cumsum()))
+
     def side_at(self, distance: float) -> float:
         """+1: along s, -1: against it."""
         return float(self.side[max(int(np.searchsorted(self.distance, distance, side="right")) - 1, 0)])

@@ -235,7 +235,6 @@ class FreeVertices(Struct, frozen=True, eq=False):
     entity: str
     beside: FloatArray  # from there, along s and t of its road, shape (2, n) [m]
     places: FloatArray  # x and y of those after them, shape (2, m) [m]
-    keeps_heading: bool = False  # it begins with the heading that it has
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, as in `TimedVertices`; each has some time, which the schemas ask for."""
@@ -247,9 +246,9 @@ class FreeVertices(Struct, frozen=True, eq=False):
         numbers += decimals(np.vstack((time[n:], self.places)).T, (1, 5, 5))
         vertex = f'<Vertex time="%s">\n{indent}{unit}<Position>{{}}</Position>\n{indent}</Vertex>'
         texts = [vertex.format(relative)] * n + [vertex.format('<WorldPosition x="%s" y="%s"/>')] * (every - n)
-        if self.keeps_heading:
-            itself = relative.replace("Road", "Object").replace(" ds=", " dx=").replace(" dt=", " dy=")[:-2]
-            texts[0] = vertex.format(f'{itself}><Orientation type="relative" h="0"/></RelativeObjectPosition>')
+        # it begins with the heading that it has
+        itself = relative.replace("Road", "Object").replace(" ds=", " dx=").replace(" dt=", " dy=")[:-2]
+        texts[0] = vertex.format(f'{itself}><Orientation type="relative" h="0"/></RelativeObjectPosition>')
         yield f"\n{indent}".join(texts) % numbers
 
 

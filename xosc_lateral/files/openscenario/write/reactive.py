@@ -28,7 +28,7 @@ from xosc_lateral.world.motion.way import RoadPlace
 from xosc_lateral.world.scenario.controllers import Domains, controlled_entities, driven_from_the_start, gives
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
-from xosc_lateral.world.scenario.private_actions import LATERAL, FollowTrajectoryAction, TeleportAction
+from xosc_lateral.world.scenario.private_actions import LATERAL, TeleportAction
 from xosc_lateral.world.scenario.scenario import Scenario
 
 PATH_NAME = "xosc-lateral offsets"
@@ -82,15 +82,16 @@ def _element_of(path: OffsetPath, draft: Draft) -> etree._Element:
 
 
 def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
-    """Event, action and trigger stay; the player moves it along the path."""
+    """Event, action and trigger stay; the player moves it along the path, or as written to beside the middle."""
+    if path.settles is not None:
+        change.set("targetLaneOffset", build.decimal(path.settles[0], 4))
+        return
     lateral = change.getparent()
     assert lateral is not None
     private = lateral.getparent()
     assert private is not None
     routing = etree.Element("RoutingAction")
-    _follow(
-        build.sub(routing, "FollowTrajectoryAction"), name, draft, _vertices(path, path.pieces[0], keeps_heading=False)
-    )
+    _follow(build.sub(routing, "FollowTrajectoryAction"), name, draft, _vertices(path, path.pieces[0]))
     place = private.index(lateral)
     private.remove(lateral)
     build.insert_indented(private, place, routing)
@@ -128,15 +129,18 @@ def _add_acts(story: etree._Element, path: OffsetPath, draft: Draft, lateral: La
     for _ in range(count):
         act = build.sub(story, "Act", name=f"{PATH_NAME} {len(story) + 1}")
         name = str(act.get("name"))
-        _add_pieces(act, name, path, draft, is_turned=begun_by is not None and begun_by.turns)
+        over = next((one for one in actions if one.path == path.over), None)
+        _add_pieces(act, name, path, draft, over)
         _add_start(act, path, begun_by, before, draft.version)
-        _add_stop(act, name, path, [one for one in actions if one is not begun_by or one.repeats])
+        kept = [one for one in actions if one is not begun_by or one.repeats]
+        _add_stop(act, name, path, kept if over is None else [one for one in kept if one.path in path.unless])
         before = name
 
 
-def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft, *, is_turned: bool) -> None:
+def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft, over: LateralAction | None) -> None:
     """A trajectory each: the reference player finds the places of vertices when it starts, so it may run once."""
-    maneuver, begins = build.maneuver(act, f"{name} path", path.entity), ("act", name, "runningState")
+    maneuver = build.maneuver(act, f"{name} path", path.entity)
+    begins = ("act", name, "runningState") if over is None else (over.kind, over.reference, "runningState")
 
     def event(number: int, wait: float) -> etree._Element:
         nonlocal begins
@@ -149,10 +153,9 @@ def _add_pieces(act: etree._Element, name: str, path: OffsetPath, draft: Draft, 
     if path.settles is not None:
         _settle(event(0, FIRST_WAIT), path, *path.settles)
     for number, piece in enumerate(path.pieces, start=1):
-        wait = 0.0 if isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
+        wait = 0.0 if over is not None or isinstance(piece, Bridge) else FIRST_WAIT  # its first place is just ahead
         follow = build.sub(event(number, wait), "RoutingAction/FollowTrajectoryAction")
-        keeps_heading = number == 1 and is_turned and path.settles is None
-        _follow(follow, f"{name}.{number}", draft, _vertices(path, piece, keeps_heading=keeps_heading))
+        _follow(follow, f"{name}.{number}", draft, _vertices(path, piece))
 
 
 def _settle(action: etree._Element, path: OffsetPath, aside: float, within: float) -> None:
@@ -172,10 +175,11 @@ def _follow(follow: etree._Element, name: str, draft: Draft, vertices: build.Fre
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
 
 
-def _vertices(path: OffsetPath, piece: PathPiece | Bridge, *, keeps_heading: bool) -> build.FreeVertices:
+def _vertices(path: OffsetPath, piece: PathPiece | Bridge) -> build.FreeVertices:
     if isinstance(piece, Bridge):
-        return build.FreeVertices(path.entity, np.zeros((2, 1)), piece.nominal + piece.aside, keeps_heading)
-    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)), keeps_heading)
+        beside = path.side * np.stack(piece.beside)
+        return build.FreeVertices(path.entity, beside, piece.nominal + piece.aside)
+    return build.FreeVertices(path.entity, path.side * np.stack(piece), np.empty((2, 0)))
 
 
 def _add_start(
@@ -241,7 +245,6 @@ class LateralAction(Struct, frozen=True):
     repeats: bool = False  # it may run more than once
     adds: bool = False  # it adds the entity
     steers: bool | None = None  # it gives the entity to a controller; False: it takes it back
-    turns: bool = False  # it may leave the entity turned against its lane: a trajectory, or what is ended half-way
 
 
 class LateralActions(Struct, frozen=True):
@@ -259,8 +262,6 @@ class LateralActions(Struct, frozen=True):
         by_entity: dict[str, dict[LateralAction, None]] = {}
         for at in scenario.storyboard.events():
             repeats = at.group.maximum_execution_count > 1 or at.event.maximum_execution_count > 1
-            others = (one for maneuver, one in at.group.events() if maneuver.name == at.path[3] and one is not at.event)
-            is_cut = at.act.stop_trigger is not None or any(one.priority is Priority.OVERRIDE for one in others)
             for action in at.event.actions:
                 content, path = action.content, (*at.path, action.name)
                 reference = _reference(path, len(at.event.actions) == 1, names)
@@ -268,8 +269,7 @@ class LateralActions(Struct, frozen=True):
                 for actor in (content.entity_ref,) if isinstance(content, AddEntityAction) else at.actors:
                     steers = gives(content, controls[actor]) if actor in controls else None
                     if adds or steers is not None or isinstance(content, (*LATERAL, TeleportAction)):
-                        turns = isinstance(content, FollowTrajectoryAction) or (is_cut and isinstance(content, LATERAL))
-                        lateral = LateralAction(path, *reference, repeats, adds, steers, turns)
+                        lateral = LateralAction(path, *reference, repeats, adds, steers)
                         by_entity.setdefault(actor, {})[lateral] = None
         actions = {entity: tuple(found) for entity, found in by_entity.items()}
         return cls(actions, controls, driven_from_the_start(scenario))
