@@ -44,9 +44,7 @@ from xosc_lateral.drivers.fitting.models.autoregressive_fit import (
     fit_volatility,
     log_power,
     rounded,
-    simulate,
 )
-from xosc_lateral.drivers.fitting.models.bursts import as_bursting, has_bursts
 from xosc_lateral.drivers.fitting.sensor.likelihood import KNOTS, interpolation
 from xosc_lateral.drivers.fitting.sensor.periodogram import uniform_variance
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
@@ -106,9 +104,6 @@ STEADY_TIME = 20_000.0
 """Of steady movement, simulated to compare that with. [s]"""
 
 SEED = 20240517
-
-SEEN_ROWS, SEEN_DRIVERS = 500, 1000
-"""Simulated to see bursts: 28 hours. [-]"""
 
 MOTION_COLUMNS = {"speed", "acceleration"}
 """By which effects on the fine part describe fast movement."""
@@ -326,8 +321,6 @@ def with_fast_part(profile: DriverProfile, fast: FastPart | None, below: float) 
     volatility = model.fine_volatility if fast is None or corner > BORDER else fast.volatility
     fine = shaped(np.sqrt(kept_power / NOISE_VARIANCE), FINE_SETTINGS)
     made = replace(model, coarse=coarse, fine=fine, fine_volatility=volatility)
-    if fast is not None and has_bursts(model):
-        made = as_bursting(made, lambda varied: simulate(varied, SEEN_ROWS, SEED, drivers=SEEN_DRIVERS), model)
     kept = [
         effect
         for effect in profile.effects

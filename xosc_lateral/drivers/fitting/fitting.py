@@ -25,6 +25,7 @@ from xosc_lateral.drivers.fitting.bands import (
     in_bands,
     split_by_band,
 )
+from xosc_lateral.drivers.fitting.closing import differences
 from xosc_lateral.drivers.fitting.context_effects import (
     LEAST_DRIVES,
     beside_effects,
@@ -88,6 +89,9 @@ def fit_profile(
         known = provenance or Provenance()
         known = replace(known, fit={**known.fit, **_marking_notes(slow)})
         profile = fit_population(runs, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
+        if lacking := differences(profile, runs):
+            known = replace(profile.provenance, fit={**profile.provenance.fit, "not_as_measured": lacking})
+            profile = replace(profile, provenance=known)
         if fast:
             fast_runs, _ = driver_runs(all_runs(fast, rules), fast)
     else:
@@ -242,9 +246,16 @@ def fit_warnings(
     With a `reference`, of real drivers, also about its band.
     """
     return [
-        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile),
+        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile), *_not_as_measured(profile),
         *([] if reference is None else _band_warnings(profile, reference)),
     ]  # fmt: skip
+
+
+def _not_as_measured(profile: DriverProfile) -> list[str]:
+    """What the closing check found, in one line."""
+    lacking = profile.provenance.fit.get("not_as_measured", {})
+    parts = ", ".join(f"{name} {was:g} becomes {now:g}" for name, (was, now) in lacking.items())
+    return [f"{profile.name} does not drive as its drives do: {parts}"] if parts else []
 
 
 def _beside_given(profile: DriverProfile, stated: float | None) -> list[str]:

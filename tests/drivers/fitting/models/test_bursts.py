@@ -8,7 +8,7 @@ from scipy.stats import kurtosis
 
 from tests.kit.core_models import POPULATION
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate
-from xosc_lateral.drivers.fitting.models.bursts import BURST_TIME, _measured, as_bursting, log_kurtosis, with_bursts
+from xosc_lateral.drivers.fitting.models.bursts import BURST_TIME, _measured, log_kurtosis, with_bursts
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Volatility
 
@@ -42,7 +42,8 @@ def test_a_driver_who_bursts_is_recognised_and_sampled_so() -> None:
 def test_what_chance_does_is_no_burst() -> None:
     unchanged = [with_bursts(POPULATION, recorded(POPULATION, seed), NAMES, draw) is POPULATION for seed in range(6)]
     assert sum(unchanged) >= 4  # a lack of more than one standard error: one in six by chance
-    assert with_bursts(BURSTING, recorded(POPULATION, 7), NAMES, draw) is BURSTING
+    calmed = with_bursts(BURSTING, recorded(POPULATION, 7), NAMES, draw)
+    assert log_kurtosis(draw(calmed)) < log_kurtosis(draw(BURSTING)) - 0.1
 
 
 def test_the_error_is_what_drawing_other_drives_changes() -> None:
@@ -54,12 +55,3 @@ def test_the_error_is_what_drawing_other_drives_changes() -> None:
     assert abs(error / np.std(drawn) - 1.0) < 0.25
     both = _measured([*runs, np.zeros(3)], [*NAMES, NAMES[0]])  # a run too short for one speed adds nothing
     np.testing.assert_allclose(both, (value, error))
-
-
-def test_movement_of_another_origin_hides_no_burst() -> None:
-    steadier = replace(BURSTING, fine=replace(BURSTING.fine, damping=3.0 * BURSTING.fine.damping))
-    steadier = replace(steadier, fine_volatility=Volatility())
-    made = as_bursting(steadier, draw, BURSTING)
-    wanted, hidden, shown = (log_kurtosis(draw(model)) for model in (BURSTING, steadier, made))
-    assert hidden < wanted - 0.12
-    assert abs(shown - wanted) < 0.06

@@ -46,20 +46,47 @@ def with_bursts(
     paths = draw(model)
     shown = log_kurtosis(paths)
     lack = measured - shown
-    if not lack > error:
+    if not abs(lack) > error:
         return model
+    wanted = shown + lack * (1.0 - (error / lack) ** 2)
+    if lack < 0.0:
+        return _calmed(model, wanted, draw, paths)
     fast = replace(model, coarse_volatility=replace(model.coarse_volatility, correlation_time=BURST_TIME))
-    return _bursting(fast, shown + lack * (1.0 - (error / lack) ** 2), draw, _level(paths))
+    return _bursting(fast, wanted, draw, _level(paths))
 
 
-def has_bursts(model: AutoregressiveModel) -> bool:
-    """Whether drives showed any beyond chance."""
-    return model.coarse_volatility.correlation_time == BURST_TIME
+LESS_SHARE = (0.0, 0.1, 0.25, 0.5, 0.75, 1.0)
+"""Of what volatilities vary within seconds, as tried. [-]"""
 
 
-def as_bursting(model: AutoregressiveModel, draw: Draw, other: AutoregressiveModel) -> AutoregressiveModel:
-    """A model in which movement of another origin hides no burst: lateral speeds have the kurtosis of another's."""
-    return _bursting(model, log_kurtosis(draw(other)), draw, _level(draw(model)))
+def _calmed(model: AutoregressiveModel, wanted: float, draw: Draw, paths: FloatArray) -> AutoregressiveModel:
+    """A model whose volatilities vary within seconds by so much less that lateral speeds have a log kurtosis.
+
+    What differs from window to window without being lively in any second is no volatility: a driver who corrects now
+    and then. Typical movement and acceleration stay as large as in `paths`.
+    """
+
+    def calm(share: float) -> AutoregressiveModel:
+        coarse, fine = model.coarse_volatility, model.fine_volatility
+        return replace(
+            model,
+            coarse_volatility=replace(coarse, within=share * coarse.within),
+            fine_volatility=replace(fine, within=share * fine.within),
+        )
+
+    shown = np.maximum.accumulate([log_kurtosis(draw(calm(share))) for share in LESS_SHARE])
+    made = calm(float(np.interp(wanted, shown, LESS_SHARE)))
+    now = draw(made)
+    slow, fast = (float(np.exp(level(paths) - level(now))) for level in (_level, _roughness))
+    coarse, fine = made.coarse, made.fine
+    return replace(
+        made, coarse=replace(coarse, scale=coarse.scale * slow), fine=replace(fine, damping=fine.damping * fast)
+    )
+
+
+def _roughness(paths: FloatArray) -> float:
+    """Mean logarithm of the standard deviations of paths' second differences. [log of the unit]"""
+    return float(np.log(np.diff(paths, 2, axis=1).std(axis=1) + 1e-12).mean())
 
 
 def _bursting(model: AutoregressiveModel, wanted: float, draw: Draw, level: float) -> AutoregressiveModel:

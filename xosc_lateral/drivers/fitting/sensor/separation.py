@@ -142,14 +142,10 @@ def separate(
 
 
 def _taken(candidates: Sequence[Explanation]) -> Explanation:
-    """The best by its criterion, or that of the plausible ones which another measurement supports."""
-    least = min(candidates, key=lambda each: each.criterion)
-    seen = [
-        each
-        for each in candidates
-        if each.colour.view is not None and each.criterion < least.criterion + CRITERION_MARGIN
-    ]
-    return min(seen, key=lambda each: each.criterion, default=least)
+    """Of those that are plausible: what another measurement supports, else no low-passed error, else the best one."""
+    most = min(each.criterion for each in candidates) + CRITERION_MARGIN
+    plausible = [each for each in candidates if each.criterion < most]
+    return min(plausible, key=lambda each: (each.colour.view is None, each.colour.order > 0, each.criterion))
 
 
 def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None) -> float:
