@@ -13,8 +13,10 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
 from xosc_lateral.extras.loop.autocorrelation import Problem
+from xosc_lateral.extras.loop.candidates import Family
 from xosc_lateral.extras.loop.dictionary import (
     CROSS_BASIS,
+    LEFT_OVER,
     LIKELIHOOD_MARGIN,
     Dictionary,
     Search,
@@ -28,7 +30,7 @@ from xosc_lateral.extras.loop.dictionary import (
 from xosc_lateral.extras.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.extras.loop.omnibus import courses
 from xosc_lateral.extras.loop.refinement import Refined, Refinement
-from xosc_lateral.extras.loop.significance import NULL_DRAWS, LoopSeed, draw_null, score_at, upper_tail
+from xosc_lateral.extras.loop.significance import MANY_DRIVES, NULL_DRAWS, LoopSeed, draw_null, score_at, upper_tail
 from xosc_lateral.extras.loop.terms.column import ColumnTerm, of_kind
 
 # Sets of columns that are refined, at most: of 35 effects 23 are named with one, 24 with four and with eight
@@ -43,6 +45,10 @@ CLUSTER_S = 120
 # Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
 # the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]
 GROWTH_ERRORS = 2.0
+# Directions of a column's plain responses with less than this share of the largest variance have no slope of their own
+# in every drive. [-]
+OWN_SLOPES = 0.2
+FEWEST = 3  # Drives from which slopes of their own are looked at.
 ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
 
 
@@ -85,11 +91,12 @@ class _Scored:
     maxima: FloatArray  # shape (draws,): The largest that the null gives.
     left: FloatArray  # shape (seconds,): What the scores are of.
     span: Callable[[str], FloatArray]  # All that a column does alone, shape (seconds, rank), orthonormal.
+    own: Callable[[str], FloatArray]  # What it does with slopes of each drive's own, shape (seconds, k).
 
     @cached_property
     def scores(self) -> FloatArray:
         """Squared score less cost, shape (entries,); -inf: barred."""
-        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span)
+        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span, self.own)
 
     @property
     def best(self) -> int:
@@ -137,6 +144,10 @@ class ColumnSearch:
         while scored is not None:
             likeliest, p_value = scored.likeliest()
             if not self.kind.passes(self.search, p_value, self.fitted):  # refined, it would not be accepted either
+                entry, own_p = self.in_some_drives(scored, refused)
+                if entry is not None and self.kind.passes(self.search, own_p, self.fitted):
+                    some: SearchedTerm = self.kind.of(scored.dictionary.timed(entry))
+                    return Outcome(some, some.columns, own_p, fit_model(self.fitted.coarse, (*self.fitted.terms, some)))
                 return Outcome(None, likeliest.columns, p_value)
             term, after = self._term(scored, refused)
             if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
@@ -151,7 +162,41 @@ class ColumnSearch:
         if scored is None:
             return 1.0
         members = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
-        return upper_tail(float(scored.scores[members].max()), scored.maxima) if members else 1.0
+        p_value = upper_tail(float(scored.scores[members].max()), scored.maxima) if members else 1.0
+        return min(p_value, self.in_some_drives(scored, (), columns)[1])
+
+    def in_some_drives(
+        self, scored: _Scored, refused: Collection[tuple[str, ...]], only: tuple[str, ...] = ()
+    ) -> tuple[int | None, float]:
+        """The plain entry that explains most with a slope of each drive's own, and its p-value by the same null."""
+        drive = self.search.coarse.drive[scored.problem.whitener.valid]
+        drives, candidates = np.unique(drive), scored.dictionary.candidates
+        taken = {term.columns for term in of_kind(self.fitted, self.kind)} | set(refused)
+        barred = self.kind.barred(self.fitted)
+        plain = [
+            i
+            for i, one in enumerate(candidates)
+            if one.family is Family.PLAIN and one.columns not in taken and barred.isdisjoint(one.columns)
+        ]
+        if self.kind.acts is not Acts.LOCATION or not FEWEST <= len(drives) < MANY_DRIVES or not plain:
+            return None, 1.0
+        null = draw_null(scored.left, drive, generator(self.search.seed, LoopSeed.COLUMNS))
+        found = (scored.own(name) for term in of_kind(self.fitted, self.kind) for name in term.columns)
+        known = orthonormal(np.concatenate([scored.known, *found], axis=1), CROSS_BASIS)
+        rows = beside(known, np.concatenate([scored.left[:, None], null], axis=1))
+        entries = beside(known, scored.dictionary.rows[plain].astype(np.float64).T)
+        explained = np.zeros((len(plain), rows.shape[1]))
+        for one in drives:
+            own = entries[drive == one].T
+            power = np.square(own).sum(axis=1)
+            there = power > 3.0 * LEFT_OVER / len(drives)  # a copy of what was found has nothing left
+            explained[there] += np.square(own[there] @ rows[drive == one]) / power[there, None]
+        names = [i for i in range(len(plain)) if not only or candidates[plain[i]].columns == only]
+        if not names:
+            return None, 1.0
+        best = names[int(np.argmax(explained[names, 0]))]
+        # the second of two looks
+        return plain[best], min(1.0, 2.0 * upper_tail(explained[best, 0], explained[:, 1:].max(axis=0)))
 
     def limits(self, level: float) -> tuple[Problem, FloatArray, float] | None:
         """Regression, what is known in it (white, orthonormal), and the score whose p-value is a level; None: empty."""
@@ -194,13 +239,15 @@ class ColumnSearch:
         sizes = np.maximum(np.linalg.norm(problem.known, axis=0), 1e-300)
         blocks = [orthonormal(problem.known / sizes, 1e-8)]
         for term in of_kind(self.fitted, kind):
+            if set(spared) < set(term.columns):
+                continue
             parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
             rows = np.array([candidate.columns in parts for candidate in candidates])
             if rows.any():
                 blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))
         known = orthonormal(np.concatenate(blocks, axis=1), 1e-6)
         left, drive = of_unit_variance(beside(known, problem.observed)), search.coarse.drive[problem.whitener.valid]
-        null = draw_null(left, drive, generator(search.seed, LoopSeed.COLUMNS), draws)
+        null, drives = draw_null(left, drive, generator(search.seed, LoopSeed.COLUMNS), draws), np.unique(drive)
         scores, maxima = score_entries(dictionary, left, known, barred, null, of_mean=kind.acts is Acts.LOCATION)
 
         @cache
@@ -210,7 +257,15 @@ class ColumnSearch:
             both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
             return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
 
-        return _Scored(problem, dictionary, known, scores, maxima, left, span)
+        @cache
+        def own(column: str) -> FloatArray:
+            plain = [i for i, one in enumerate(candidates) if one.columns == (column,) and one.family is Family.PLAIN]
+            if not plain or not 1 < len(drives) < MANY_DRIVES:
+                return np.zeros((len(left), 0))
+            leading = orthonormal(dictionary.rows[plain].astype(np.float64).T, OWN_SLOPES)
+            return np.concatenate([leading * (drive == one)[:, None] for one in drives], axis=1)
+
+        return _Scored(problem, dictionary, known, scores, maxima, left, span, own)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
         """The term that the best candidate becomes, and the fit with it.

@@ -19,10 +19,11 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
-from xosc_lateral.drivers.model.effects import ColumnEffect
+from xosc_lateral.drivers.model.effects import ColumnEffect, Product
 from xosc_lateral.extras.loop.autocorrelation import Whitener
 from xosc_lateral.extras.loop.candidates import Candidate, Family, candidates_of
 from xosc_lateral.extras.loop.columns import Column
+from xosc_lateral.extras.loop.significance import as_one_degree
 from xosc_lateral.extras.loop.timeline import Coarse, Timeline, coarse_mean, coarse_middle, start_anew
 
 SingleArray = NDArray[np.float32]
@@ -42,6 +43,9 @@ ROBUST_ENTRIES = 200  # Entries whose scores are set beside the squares of their
 # Of one column's entries, the best so many stand for all that it may do; more of them span hardly more.
 RESPONSE_ENTRIES = 12
 CHUNK_CANDIDATES = 48  # Candidates that are whitened at once: few enough to stay in a processor's cache.
+# A factor of a product that keeps less than this share of its variance within drives tells drives apart, unless so many
+# drives are on either side. [-]
+LEFT_WITHIN, FEWEST_A_SIDE = 0.1, 5
 LEAST_POWER = 1e-30  # Keeps single precision from dividing by zero.
 
 
@@ -98,6 +102,21 @@ class Dictionary:
         """An entry's effect with its lag and response."""
         effect = self.candidates[index].effect
         return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
+
+
+def tells_drives(values: FloatArray, coarse: Coarse) -> bool:
+    """Whether values, shape (fine n,), say little but which drive it is: they hardly change within drives, and too few
+    drives are on either side."""
+    if coarse.drives == 1:
+        return False
+    inside, drive = coarse.timeline.valid, coarse.timeline.drive
+    seen, own = np.nan_to_num(values[inside], nan=0.0, posinf=0.0, neginf=0.0), drive[inside]
+    rows = np.bincount(own, minlength=coarse.drives)
+    usual = np.bincount(own, seen, minlength=coarse.drives) / np.maximum(rows, 1)
+    there = usual[rows > 0]
+    high = int(np.sum(there > 0.5 * (there.min() + there.max())))
+    few = min(high, len(there) - high) < FEWEST_A_SIDE
+    return few and float(np.mean(np.square(seen - usual[own]))) < LEFT_WITHIN * float(seen.var())
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
@@ -198,9 +217,15 @@ def _beside_loud_stretches(
 
 
 def beside_parts(
-    scores: FloatArray, dictionary: Dictionary, left: FloatArray, known: FloatArray, spans: Callable[[str], FloatArray]
+    scores: FloatArray,
+    dictionary: Dictionary,
+    left: FloatArray,
+    known: FloatArray,
+    spans: Callable[[str], FloatArray],
+    own: Callable[[str], FloatArray],
 ) -> FloatArray:
-    """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components."""
+    """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components. None
+    that explains less than slopes of each drive's `own` would: it would stand for which drive it is."""
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -214,8 +239,12 @@ def beside_parts(
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)
         rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
         power = np.square(rows).sum(axis=0)
-        gains = np.square(beside(span, left) @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
-        scores[entries] = np.where(power > LEFT_OVER, np.minimum(scores[entries], gains), -np.inf)
+        rest = beside(span, left)
+        gains = np.square(rest @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
+        slopes = [orthonormal(beside(span, own(column)), CROSS_BASIS) for column in pair]
+        rivals = [as_one_degree(float(np.sum(np.square(rest @ one))), one.shape[1]) for one in slopes if one.shape[1]]
+        usable = (power > LEFT_OVER) & (gains > max(map(float, rivals), default=-np.inf))
+        scores[entries] = np.where(usable, np.minimum(scores[entries], gains), -np.inf)
     return scores
 
 
@@ -270,7 +299,12 @@ class Search:
         """Evaluate all candidates once."""
         inside = coarse.timeline.valid
         seen = {column.name: coarse.context[column.name][inside] for column in columns}
-        candidates = candidates_of(columns, seen)
+        every = candidates_of(columns, seen)
+        factors = {factor for one in every if isinstance(one.effect, Product) for factor in one.effect.factors}
+        barred = {factor for factor in factors if tells_drives(factor.values(coarse.context), coarse)}
+        candidates = [
+            one for one in every if not isinstance(one.effect, Product) or barred.isdisjoint(one.effect.factors)
+        ]
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, levels, progress)
 

@@ -31,6 +31,10 @@ FEWEST_BETWEEN = 5  # Drives from which a column that is constant in each is tes
 MEAN_INFLATION, SPREAD_INFLATION, PRIOR_DRIVES = 2.1, 1.65, 4.0
 # Rounds at most, and the share of the variance between drives that the last one may change it by. [-]
 ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
+LEAST_SHARE = 0.1  # Of the usual information of a drive below which its own slope says nothing. [-]
+OWN_LEVEL = 0.01  # p-value up to which drives are said to differ. [-]
+SURE = 2.0  # Standard errors by which an effect is there in a drive. [-]
+DEGREES = 60.0  # Of freedom with which the variance that slopes have by chance is known. [-]
 POWER_Z = 0.84  # Standard normal quantile of a power of 80 %.
 BOUND_Z = 1.645  # Of a one-sided bound of 95 %.
 
@@ -131,3 +135,46 @@ def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled
     slope = float((inverse @ weighed.T @ (values * root))[1])
     factor = max(1.0, float(rest @ rest) / degrees)
     return Pooled(slope, float(np.sqrt(factor * inverse[1, 1])), degrees, len(values))
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSlopes:
+    """Whether an effect differs from drive to drive: slopes over the common one, shape (drives,)."""
+
+    relative: FloatArray  # 1: as the effect is; 0: it does not act there; NaN: the drive says nothing.
+    error: FloatArray
+    p_value: float  # That slopes scatter as much though all are alike. [-]
+    scatter: float  # Standard deviation between drives. [-]
+    there: tuple[str, ...]  # Drives in which it surely acts, by name.
+
+    @property
+    def relative_there(self) -> float:
+        """Mean slope of those. [-]"""
+        return float(np.mean(self.relative[self.relative > SURE * self.error]))
+
+    @property
+    def differ(self) -> bool:
+        """Whether drives surely differ."""
+        return self.p_value <= OWN_LEVEL
+
+
+def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes | None:
+    """Slopes of white rows, levels taken out, on the white path of an effect, shape (n,) each; None: too few drives."""
+    from scipy.stats import f
+
+    power = np.bincount(coarse.drive, path**2, minlength=coarse.drives)
+    lasting = (counted(coarse) > 0.0) & (power > LEAST_SHARE * power.sum() / coarse.drives)
+    if (number := int(lasting.sum())) < FEWEST:
+        return None
+    slopes = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
+    weight = np.where(lasting, power, 0.0)
+    mean = float(weight @ slopes / weight.sum())
+    scatter = float(weight @ np.square(slopes - mean)) / MEAN_INFLATION
+    p_value = max(float(f.sf(scatter / (number - 1), number - 1, DEGREES)), MINIMUM_P)
+    noise = np.where(lasting, MEAN_INFLATION / np.maximum(power, 1e-300), np.inf)
+    between = 1.0 / weights_between(slopes, noise, np.ones((len(slopes), 1)))[lasting] - noise[lasting]
+    relative = np.where(lasting, slopes / mean if mean else np.nan, np.nan)
+    error = np.where(lasting, np.sqrt(noise) / max(abs(mean), 1e-300), np.nan)
+    there = tuple(name for name, sure in zip(coarse.timeline.names, relative > SURE * error, strict=True) if sure)
+    spread = float(np.sqrt(max(between.mean(), 0.0))) / max(abs(mean), 1e-300)
+    return OwnSlopes(relative, error, p_value, spread, there)

@@ -31,6 +31,7 @@ from xosc_lateral.drivers.model.profile import COLUMNS, DriverProfile, Provenanc
 from xosc_lateral.drivers.model.seeds import child, generator
 from xosc_lateral.extras.loop import residual
 from xosc_lateral.extras.loop.columns import Column
+from xosc_lateral.extras.loop.dictionary import tells_drives
 from xosc_lateral.extras.loop.identify import Nested, Progress, folds_of, hold_out_blocks
 from xosc_lateral.extras.loop.model import Fitted, fit_model
 from xosc_lateral.extras.loop.selection import Selection
@@ -208,9 +209,11 @@ def fit_refined(
 def _quantities(fitted: Fitted, columns: list[Column]) -> dict[str, FloatArray]:
     """What the residual is binned by: every column that may act, and every found effect's own quantity."""
     coarse = fitted.coarse
-    quantities = {column.name: coarse.context[column.name] for column in columns}
+    seen = {column.name: coarse.context[column.name] for column in columns}
+    # a drive's own place is no misfit: halves of one drive do not show what places scatter by
+    quantities = {name: values for name, values in seen.items() if not tells_drives(values, coarse)}
     for column in columns:
-        if column.period:
+        if column.period and column.name in quantities:
             angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
             quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
     for key, (term, effects) in fitted.estimates.items():

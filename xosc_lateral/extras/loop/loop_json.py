@@ -25,7 +25,7 @@ MEASURE = (
 )
 
 FINDING_FIELDS = (
-    *("effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "size_error", "static_gain"),
+    *("effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "size_error"),
     *("p_value", "error_before", "error_after"),
 )
 
@@ -41,7 +41,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "refined_profile": _profile(result.refined),
         "held_out": held_out_words(result.coarse.timeline),
         "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
-        "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
+        "findings": [finding_record(finding) | {"meaning": meaning(finding)} for finding in result.findings],
         "consequences": [
             {"column": item.column, "why": feedback_words(item), "doubtful": item.doubtful}
             | {"coherence": item.coherence, "predicted_share": item.predicted_share}
@@ -106,6 +106,7 @@ def finding_record(finding: Finding) -> dict[str, Any]:
     passage, about = finding.passage, NORMAL_95 * finding.size_error
     return {name: getattr(finding, name) for name in FINDING_FIELDS} | {
         "columns": list(finding.columns),
+        "between": finding.ends and {"from": dict(finding.ends.low), "to": dict(finding.ends.high)},
         "measure": f"{finding.measure}, m",
         "alike": sorted({name for columns in finding.alike for name in columns} - set(finding.columns)),
         "instead": [list(columns) for columns in finding.alike],

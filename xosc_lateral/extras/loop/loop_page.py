@@ -160,7 +160,7 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         return
     for finding in result.findings:
         page.heading(_capital(finding.effect))
-        page.text(loop_words.meaning(finding, result))
+        page.text(loop_words.meaning(finding))
         effect = finding.effects[0] if finding.effects else None
         if not isinstance(effect, ColumnEffect):
             draw, caption = loop_figures.DRAWINGS[effect.kind if effect is not None else finding.kind]

@@ -46,15 +46,12 @@ def shown_text(shown: Sequence[Shown]) -> str:
 
 def shown_words(shown: Sequence[Shown]) -> str:
     """What silence means here, in a sentence."""
-    forms = {
-        "mean": f"{{0:.2f}} to {{1:.2f}}{GAP}m of the mean",
-        "spread": "factors of {0:.1f} to {1:.1f} of the spread",
-    }
+    forms = {"mean": f"{{0:.2f}}{GAP}m of the mean", "spread": "a factor of {0:.1f} of the spread"}
     words = []
     for acts, form in forms.items():
-        sizes = [one.smallest for one in shown if one.acts == acts and one.smallest is not None]
-        words += [form.format(min(sizes), max(sizes))] if sizes else []
-    untested = sum(not one.tested for one in shown)
-    effects = f"effects from {' and '.join(words)} on, depending on the column, in four of five cases"
+        sizes = sorted(one.smallest for one in shown if one.acts == acts and one.smallest is not None)
+        words += [form.format(sizes[len(sizes) // 2])] if sizes else []
+    untested = sum(not one.tested and one.acts != "mean and spread" for one in shown)
+    effects = f"effects from {' and '.join(words)} on of every other column, in four of five cases"
     seen = effects if words else "no effect"
     return f"These drives show {seen}; {untested} of {len(shown)} looks could not be taken."

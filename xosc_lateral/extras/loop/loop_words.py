@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Product
 from xosc_lateral.extras.loop.close import Finding, LoopResult
 from xosc_lateral.extras.loop.columns import FEEDBACK_BAND_HZ, FUNCTION_COHERENCE, Feedback
+from xosc_lateral.extras.loop.drives import OwnSlopes
+from xosc_lateral.extras.loop.ends import Ends
 from xosc_lateral.extras.loop.loop_shown import GAP, shown_words
 from xosc_lateral.extras.loop.omnibus import DELAYS
 from xosc_lateral.extras.loop.passage import Passage
@@ -103,16 +106,11 @@ def product_label(effect: Product) -> str:
 
 
 def size_words(finding: Finding) -> str:
-    """Size with two standard errors and its unit, and in words to which side; where others are, in a driver's words."""
-    effect = finding.effects[0] if finding.effects else None
-    if finding.kind != "location" or not isinstance(effect, ColumnEffect):
-        return _size(finding)
-    further = f"{_size(finding).lstrip('+-')} further {_side(finding.size_m)}"
+    """Size with two standard errors and its unit, and between which ends it is."""
     if finding.over_time and finding.passage is not None:
         moment = float(finding.passage.time[finding.passage.at])
-        return f"{further} {_moment(moment) if moment else 'as it begins'} in a typical passage"
-    rises = "as it rises" if len(finding.columns) == 1 else "from the low to the high end"
-    return beside_words(effect, _share_of_error(finding)) or f"{further} {rises}"
+        return f"{_does(finding)} {_moment(moment) if moment else 'as it begins'} in a typical passage"
+    return f"{_does(finding)} {_where(finding.ends)}" if finding.ends else _size(finding)
 
 
 def _size(finding: Finding) -> str:
@@ -120,12 +118,33 @@ def _size(finding: Finding) -> str:
     return KINDS[finding.kind][0].format(finding.size_m, about)
 
 
-def _share_of_error(finding: Finding) -> float:
-    return 2.0 * finding.size_error / abs(finding.size_m) if finding.size_m else 0.0
+def _does(finding: Finding) -> str:
+    """What is different at the high end: to which side, or by which factor."""
+    if finding.kind != "location":
+        return _size(finding)
+    return f"{_size(finding).lstrip('+-')} further {_side(finding.size_m)}"
 
 
 def _side(shift: float) -> str:
     return "left" if shift > 0 else "right"
+
+
+def _where(ends: Ends) -> str:
+    """From where to where a column goes, and where the other one stays."""
+    (column, low), *beside = ends.low.items()
+    high, unit = ends.high[column], CONTEXT_UNITS.get(column, "").replace("-", "")
+    if (low, high) == (0.0, 1.0):
+        words = f"while `{column}` is on"
+    elif np.isnan(low) and column in PLACES_BY_COLUMN:
+        words = f"{PLACES_BY_COLUMN[column]}, `{column}` {high:.3g} {unit}".rstrip()
+    else:
+        words = f"as `{column}` goes from {_value(low)} to {_value(high)} {unit}".rstrip()
+    words += f" ({HINTS[column]})" if column in HINTS else ""
+    return words + "".join(f" where `{name}` is {_value(value)}" for name, value in beside)
+
+
+def _value(value: float) -> str:
+    return "none" if np.isnan(value) else f"{value:.3g}"
 
 
 def _moment(seconds: float) -> str:
@@ -140,11 +159,11 @@ def p_value_words(p_value: float) -> str:
     return f"in 1 of {1.0 / p_value:,.0f} tables".replace(",", GAP)
 
 
-def meaning(finding: Finding, result: LoopResult) -> str:
+def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
     effect = finding.effects[0] if finding.effects else None
     if isinstance(effect, ColumnEffect):
-        sentence = _column_sentence(finding, effect, result)
+        sentence = _column_sentence(finding, effect)
     else:
         change = "The mean position changes with time, and the drives do not tell in which form."
         hidden = change if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
@@ -157,14 +176,11 @@ def meaning(finding: Finding, result: LoopResult) -> str:
         when = f"The driver responds {start}{slow}."
     elif finding.columns and not finding.over_time:
         when = "What counts is the mean of each drive, not changes within a drive."
-    static = ""
-    if finding.static_gain is not None and abs(finding.static_gain - finding.size_m) > 0.05 * abs(finding.size_m):
-        stays = KINDS[finding.kind][0].format(finding.static_gain, "")
-        static = f"This is what the path shows; if what drives it stayed, it would be {stays}."
+    own = finding.own_slopes
     words = [
         sentence,
+        "" if own is None or not own.differ else _own_words(finding, own),
         when,
-        static,
         f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:
@@ -175,6 +191,15 @@ def meaning(finding: Finding, result: LoopResult) -> str:
     change = f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
+
+
+def _own_words(finding: Finding, own: OwnSlopes) -> str:
+    """In which drives it acts, and how much there."""
+    differs = f"It differs from drive to drive (p = {own.p_value:.1e})"
+    if not own.there:
+        return f"{differs}; in none alone it is sure."
+    there = replace(finding, size_m=finding.size_m * own.relative_there, size_error=0.0)
+    return f"{differs}: it surely acts in {', '.join(own.there)}, {_does(there)} there; in the others less, or not."
 
 
 def others_words(finding: Finding, mark: str = "") -> str:
@@ -304,32 +329,6 @@ PLACES_BY_COLUMN: Mapping[str, str] = {
     "oncoming_distance": "when somebody comes towards him",
 }
 
-FAR_DISTANCE = 200.0  # Free space at which others count as far away. [m]
-
-
-def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
-    """An effect of others on the mean offset in a driver's words, "moves 0.22 m left beside trucks on his right, from
-    40 m on"; empty for another effect. `error`: of the shift, as a share of it.
-
-    By where the effect puts him, whatever the sign of a distance: with somebody alongside, less with nobody near. The
-    range is where 1/e of the shift is left.
-    """
-    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in PLACES_BY_COLUMN:
-        return ""
-    column, begins = effect.columns[0], ""
-    if column.endswith("distance"):
-        free = np.linspace(0.0, FAR_DISTANCE, 2001)
-        place = effect.weighed(effect.quantity({column: free}))
-        away = place - place[-1]
-        shift = float(away[np.argmax(np.abs(away))])
-        reach = float(free[np.flatnonzero(np.abs(away) >= abs(shift) * np.exp(-1.0))[-1]])
-        begins = f", from {reach:.0f}{GAP}m on" if 0.0 < reach < FAR_DISTANCE - 1.0 else ""
-    else:
-        off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
-        shift = float(on - off)
-    about = f"{GAP}±{GAP}{abs(shift) * error:.2f}" if error else ""
-    return f"moves {abs(shift):.2f}{about}{GAP}m {_side(shift)} {PLACES_BY_COLUMN[column]}{begins}"
-
 
 def _passage_sentence(passage: Passage, column: str) -> str:
     """How far to either side the car goes in a typical passage, and when."""
@@ -346,41 +345,28 @@ def _passage_sentence(passage: Passage, column: str) -> str:
     return f"In a typical passage ({typical}) the car is farthest out {', and '.join(sides)}."
 
 
-def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
+def _column_sentence(finding: Finding, effect: ColumnEffect) -> str:
     if finding.over_time and finding.passage is not None:
         return _passage_sentence(finding.passage, effect.columns[0])
-    if words := beside_words(effect, _share_of_error(finding)):
-        return f"The driver {words} (`{effect.columns[0]}`)."
-    size = _size(finding).lstrip("+-")
-    does = {
-        Acts.LOCATION: f"the car drives {size} further {_side(finding.size_m)}",
-        Acts.SPREAD: f"the movement about the mean changes by a {size}",
-        Acts.FINE: f"the fine noise changes by a {size}",
-        Acts.RATE: f"the rate of mean reversion changes by a {size}",
-    }
-    return f"{_between(effect, result)}, {does[effect.acts]}."
-
-
-def _between(effect: ColumnEffect, result: LoopResult) -> str:
-    """From where to where an effect's columns go."""
-    if isinstance(effect, Levels):
-        levels = " or ".join(f"{level:g}" for level in effect.levels)
-        return f"Where `{effect.column}` is {levels}, compared with elsewhere"
-    if isinstance(effect, Product):
-        return f"From the low to the high end of `{product_label(effect)}` (the middle 90 % of the time)"
-    column = effect.columns[0]
-    if isinstance(effect, Angular):
-        return f"From the `{column}` of the weakest to that of the strongest effect (the middle 90 % of the time)"
-    seen, name = result.coarse.context[column][result.coarse.timeline.valid], f"`{column}`"
-    seen = seen[np.isfinite(seen)]
-    if isinstance(effect, Magnitude):
-        seen, name = np.abs(seen), f"the magnitude of `{column}`"
-    if set(np.unique(seen)) <= {0.0, 1.0}:
-        return f"While `{column}` is on"
-    low, high = np.quantile(seen, [0.05, 0.95])
-    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
-    name += f" ({HINTS[column]})" if column in HINTS else ""
-    return f"As {name} goes from {low:.3g} to {high:.3g}{unit and ' '}{unit} (5 % and 95 % quantile of these drives)"
+    ends, does = (
+        finding.ends,
+        {
+            Acts.LOCATION: f"the car drives {_does(finding)}",
+            Acts.SPREAD: f"the movement about the mean changes by a {_size(finding)}",
+            Acts.FINE: f"the fine noise changes by a {_size(finding)}",
+            Acts.RATE: f"the rate of mean reversion changes by a {_size(finding)}",
+        },
+    )
+    assert ends is not None
+    words = f"{_where(ends)}, {does[effect.acts]}"
+    if ends.other:
+        (_, (name, value)) = ends.other.items()
+        change = ends.elsewhere if effect.acts is Acts.LOCATION else float(np.exp(ends.elsewhere))
+        there = replace(finding, size_m=change, size_error=0.0)
+        words += (
+            f"; where `{name}` is {_value(value)}, {_does(there) if abs(ends.elsewhere) > ends.error else 'nothing'}"
+        )
+    return f"{words[0].upper()}{words[1:]}."
 
 
 def _mm(value: float) -> str:

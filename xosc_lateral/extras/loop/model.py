@@ -25,6 +25,8 @@ from xosc_lateral.drivers.fitting.regression import clustered_least_squares, sma
 from xosc_lateral.drivers.model.effects import Acts, Effect
 from xosc_lateral.extras.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.drives import OwnSlopes
+from xosc_lateral.extras.loop.ends import Ends
 from xosc_lateral.extras.loop.passage import Passage
 from xosc_lateral.extras.loop.refinement import Alternatives
 from xosc_lateral.extras.loop.timeline import CLUSTER_S, Coarse, on_fine_grid
@@ -74,7 +76,8 @@ class Description:
     measure: str = ""  # What the errors before and after compare; empty: that group.
     lag_s: float | None = None
     response_s: float | None = None
-    static_gain: float | None = None  # What it would be if what drives it stayed: [m]; factor for scale.
+    ends: Ends | None = None  # Of its columns, between which the size is.
+    own_slopes: OwnSlopes | None = None  # How it differs from drive to drive.
     passage: Passage | None = None  # The path through a typical bend, say.
 
 

@@ -22,6 +22,7 @@ from xosc_lateral.extras.loop.core_model import MIN_DRIVES
 from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.model import Fitted, Stage, Term, design_of, fit_model
 from xosc_lateral.extras.loop.significance import BUDGET
+from xosc_lateral.extras.loop.terms.column import ColumnTerm
 
 # Every term that a file of `terms` defines, by the file's name.
 TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
@@ -45,6 +46,7 @@ ERROR_BUDGET = shared_among(TERMS)  # Of all kinds of term.
 UNFORESEEN = (ArithmeticError, AssertionError, LookupError, TypeError, ValueError)
 MAX_TERMS = 8  # Terms of one table, at most.
 UNDONE_LEVEL = 0.01  # Probability with which an effect between drives that is as within them is taken back.
+BY_PRODUCT = "it is the product with another column that acts"
 # Why a term of the movement's size is taken back that holds within drives alone.
 UNDONE = "significant within drives, but between them the movement's size does not follow it"
 
@@ -168,7 +170,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             selection = _tested_again(search, selection, candidate)
         except UNFORESEEN as error:
             selection = selection.without([candidate.term], failed("its second test", error))
-    selection = _that_can_be_told(selection)
+    selection = _beside_products(_that_can_be_told(selection))
     undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
     return selection.without(undone, UNDONE)
 
@@ -187,6 +189,20 @@ def _that_can_be_told(selection: Selection) -> Selection:
             accepted.term.describe(alone, alone.effects_of(accepted.term), "")
         except UNFORESEEN as error:
             selection = selection.without([accepted.term], failed("its description", error))
+    return selection
+
+
+def _beside_products(selection: Selection) -> Selection:
+    """Less what a column does alone that is within its error of nothing beside its product (Nelder 1977): the product's
+    space holds the column's own effect, so it is sized beside it, not searched for again."""
+    parts = [one.term for one in selection.accepted if isinstance(one.term, ColumnTerm)]
+    for term in parts:
+        if not any(set(term.columns) < set(other.columns) for other in parts):
+            continue
+        described = term.describe(selection.final, selection.final.effects_of(term), "")
+        change = 0.0 if described.ends is None else described.ends.change
+        if described.ends is not None and abs(change) < NORMAL_95 * described.ends.error or not change:
+            selection = selection.without([term], BY_PRODUCT)
     return selection
 
 
@@ -222,6 +238,7 @@ def _tested_again(search: Search, selection: Selection, candidate: Accepted) -> 
     if candidate not in selection.accepted:
         return selection
     later = [other.term for other in selection.accepted[selection.accepted.index(candidate) + 1 :]]
+    later = [term for term in later if not set(candidate.term.columns) < set(term.columns)]
     if not any(candidate.term.may_be_explained_by(term, search.coarse) for term in later):
         return selection
     without = selection.without([candidate.term], "it does not stand beside what was found after it")

@@ -271,6 +271,16 @@ class Coarse:
         response = timeline.respond(quantity, effect.lag_s, effect.response_s)
         return response if not course else np.sum([w * timeline.shifted(response, late) for late, w in course], axis=0)
 
+    def settled(self, effect: ColumnEffect, held: Mapping[str, float]) -> FloatArray:
+        """The response, within bounds, while its columns stay at the values `held`, shape (k,). [own unit]"""
+        quantity = effect.known({name: np.full(1, value) for name, value in held.items()})[0]
+        if effect.episode:
+            quantity = np.where(np.abs(quantity) >= effect.episode, quantity, 0.0)
+        gain = sum(weight for _, weight in effect.course) if effect.course else 1.0
+        return (
+            np.clip(gain * quantity, *np.asarray(effect.response_range).T) if effect.response_range else gain * quantity
+        )
+
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
         return effect.weighed(self.fine_response(effect))

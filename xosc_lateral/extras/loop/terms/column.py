@@ -10,13 +10,11 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Linear, Piecewise, Saturating, Threshold
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.extras.loop.ends import DRIVING_QUANTILES, ends_of
 from xosc_lateral.extras.loop.model import Description, Fitted, Term, proper
 from xosc_lateral.extras.loop.refinement import Alternatives
 from xosc_lateral.extras.loop.timeline import Coarse
-
-# Responses between which a factor on the movement is believed; the report tells its size between the same. [-]
-DRIVING_QUANTILES = (0.05, 0.95)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,24 +47,20 @@ class ColumnTerm(Term):
         return coarse.strength(proper(effects, ColumnEffect))  # type: ignore[type-abstract]
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
-        """Change of the expected path between its own 5 % and 95 % quantile; and of what would stay for good."""
+        """Change between the ends of its column."""
         effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
-        static = span(fitted.coarse, effect)
-        strength = on_path(fitted.coarse, effect)
-        sizes, errors = np.asarray(effect.coefficients), np.asarray(effect.errors)
-        relative = float(np.linalg.norm(errors)) / max(float(np.linalg.norm(sizes)), 1e-12)
-        on_mean = effect.acts is Acts.LOCATION
-        size = strength if on_mean else float(np.exp(strength))
+        on_mean, ends = effect.acts is Acts.LOCATION, ends_of(fitted.coarse, effect)
+        size = ends.change if on_mean else float(np.exp(ends.change))
         return Description(
             effect=f"{self.what} by {' and '.join(effect.columns)}",
             shape=effect.shape,
             size_m=size,
-            size_error=abs(strength) * relative * (1.0 if on_mean else size),
+            size_error=ends.error * (1.0 if on_mean else size),
             statistic=f"{self.group} by effect: {key}",
             measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect's own quantity",
             lag_s=effect.lag_s,
             response_s=effect.response_s,
-            static_gain=static if on_mean else float(np.exp(static)),
+            ends=ends,
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
@@ -114,48 +108,3 @@ def columns_on_size(fitted: Fitted) -> frozenset[str]:
     """Columns that act on the movement's size."""
     terms = [one for one in fitted.terms if isinstance(one, ColumnTerm) and one.acts is not Acts.LOCATION]
     return frozenset(name for term in terms for name in term.columns)
-
-
-def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Quantity, shape (k,), at the 5 % and 95 % quantile of column, product or strength, or its extremes."""
-    inside = coarse.timeline.valid
-    if isinstance(effect, Linear | Threshold | Saturating | Piecewise) and not effect.episode:
-        seen = coarse.context[effect.column][inside]
-        ends = _ends(seen[np.isfinite(seen)])
-        low, high = effect.quantity({effect.column: ends})
-        if np.any(low != high):
-            return low, high
-    quantity = coarse.timeline.held(effect.seen(coarse.context), effect.episode)[inside]
-    quantity = quantity[np.isfinite(quantity).all(axis=1)]
-    if quantity.shape[1] == 1:
-        low, high = _ends(quantity[:, 0])[:, None]
-        return low, high
-    order = np.argsort(quantity @ np.asarray(effect.coefficients))
-    weak, strong = (order[min(len(order) - 1, int(share * len(order)))] for share in DRIVING_QUANTILES)
-    return quantity[weak], quantity[strong]
-
-
-def span(coarse: Coarse, effect: ColumnEffect) -> float:
-    """Change of strength between the two ends of the driving range; [m] or natural logarithm."""
-    low, high = driving_range(coarse, effect)
-    return float((high - low) @ np.asarray(effect.coefficients))
-
-
-def on_path(coarse: Coarse, effect: ColumnEffect) -> float:
-    """Change of what an effect does between the path's own ends, with the sign of `span`; [m] or natural logarithm.
-
-    Of what acts for less than a tenth of the time the ends are its extremes: it is away from its usual place for less
-    than what quantiles show.
-    """
-    path, static = coarse.strength(effect)[coarse.timeline.valid], span(coarse, effect)
-    low, high = _ends(path)
-    reach = float(np.ptp(path))
-    away = np.abs(path - np.median(path)) > 0.5 * reach
-    if away.mean() < 2.0 * DRIVING_QUANTILES[0] and high - low < 0.5 * abs(static):
-        low, high = path.min(), path.max()
-    return float(np.copysign(high - low, static))
-
-
-def _ends(values: FloatArray) -> FloatArray:
-    low, high = np.quantile(values, DRIVING_QUANTILES)
-    return np.array([low, high] if high > low else [values.min(), values.max()])

@@ -27,11 +27,13 @@ from xosc_lateral.extras.loop.candidates import shapes_of
 from xosc_lateral.extras.loop.column_search import SearchedTerm, grows
 from xosc_lateral.extras.loop.columns import Column, read_column
 from xosc_lateral.extras.loop.dictionary import Search, beside
+from xosc_lateral.extras.loop.drives import OwnSlopes, own_slopes
+from xosc_lateral.extras.loop.ends import ends_of
 from xosc_lateral.extras.loop.low_frequencies import penalised
 from xosc_lateral.extras.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.extras.loop.omnibus import KERNELS, SECONDS, SMOOTH_COVARIANCE, check_remainder, tents
 from xosc_lateral.extras.loop.passage import Passage, passage_of, typical_passage
-from xosc_lateral.extras.loop.terms.column import driving_range, of_kind
+from xosc_lateral.extras.loop.terms.column import of_kind
 from xosc_lateral.extras.loop.timeline import Coarse, coarse_mean
 
 NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
@@ -84,6 +86,7 @@ class MeanTerm(SearchedTerm):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change over the driving range; of one column also what the car does in a typical passage."""
         described, effect = super().describe(fitted, effects, key), effects[0]
+        described = replace(described, own_slopes=self.own_slopes(fitted))
         if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
             return described
         share = described.size_error / max(abs(described.size_m), 1e-12)
@@ -94,7 +97,17 @@ class MeanTerm(SearchedTerm):
         part = fitted.mean_part(self)
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
-        return (structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors)),)
+        wide = structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors))
+        own = self.own_slopes(fitted)
+        if own is None or not own.differ:
+            return (wide,)
+        return (structs.replace(wide, between_drivers=tuple(own.scatter * np.abs(wide.coefficients))),)
+
+    def own_slopes(self, fitted: Fitted) -> OwnSlopes | None:
+        """How it differs from drive to drive."""
+        white, path = fitted.whitener.rows, fitted.whitener.rows(fitted.path(self))
+        left = white(fitted.coarse.offset - fitted.columns @ fitted.sizes)
+        return own_slopes(left + path, path, fitted.coarse)
 
 
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
@@ -105,8 +118,14 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     fades, over how far it reaches with all of them known. The likelihood is that of independent rows, scaled to the
     variance that stretches of a minute show (Chandler, Bate 2007).
     """
-    low, high = driving_range(fitted.coarse, effect)
-    contrast = high - low
+    ends = ends_of(fitted.coarse, effect)
+
+    def between(shape: ColumnEffect) -> FloatArray:
+        return fitted.coarse.settled(shape, ends.high) - fitted.coarse.settled(shape, ends.low)
+
+    contrast = between(effect)
+    if not contrast.any():
+        return 1.0
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = beside(others, white(fitted.coarse.offset))
@@ -118,10 +137,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
         width = len(contrast)
         profiles += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
     for shape in _shapes(fitted.coarse, effect):
-        low, high = driving_range(fitted.coarse, shape)
-        rows = beside(others, white(fitted.coarse.response(shape)))
-        alike = np.sign(float(np.sum(rows_known * rows)))  # nearness falls where distance rises
-        profiles.append(_profile(rows, left, alike * (high - low)))
+        profiles.append(_profile(beside(others, white(fitted.coarse.response(shape))), left, between(shape)))
     gain, size, variance = np.asarray(profiles).T
     noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
     clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
@@ -263,7 +279,7 @@ class CourseTerm(MeanTerm):
         described = super().describe(fitted, effects, key)
         size, error = passage.largest_shift
         over_time = replace(described, shape=f"{described.shape}, over time", lag_s=None, response_s=None)
-        return replace(over_time, size_m=size, size_error=error, static_gain=None, passage=passage)
+        return replace(over_time, size_m=size, size_error=error, passage=passage)
 
     def _weights(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
         """Gain at each delay and its covariance, smooth as far as the rows leave it open. [m] per unit"""
