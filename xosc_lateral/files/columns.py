@@ -34,9 +34,6 @@ DAY = 86_400.0  # [s]
 FOLD_LENGTHS = (1.0, 3601.0)
 """Clocks that are put back at the end of summer time go back by an hour, less what was not recorded there. [s]"""
 
-ROW_STEPS = (5e-4, 2.0)
-"""Median time between two rows of a recording: 2 kHz is more than any driving is logged at, and what comes every 2 s
-shows no movement in a lane. [s]"""
 
 CLOCK_TIME = r"\s*\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?\s*"
 WITH_ZONE = r".*:\d{2}(?:[.,]\d+)?\s*(?:Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)$"
@@ -226,16 +223,6 @@ def epoch_factor(time: FloatArray) -> float:
     known = time[np.isfinite(time)]
     middle = float(np.median(known)) if len(known) else 0.0
     return next((unit for count, unit in EPOCHS.items() if EPOCHS_BEGIN * count < middle < 4.1e9 * count), 1.0)
-
-
-def require_row_step(step: float, path: Path) -> None:
-    """Refuse a median step of rows that no recording has. [s]"""
-    if not ROW_STEPS[0] <= step <= ROW_STEPS[1]:
-        units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # the likeliest: nearest to 20 rows/s
-        likely = min(units, key=lambda name: abs(np.log(step * units[name] / 0.05)))
-        unit = f"{likely} (time=COLUMN:{likely}), or count frames (time=COLUMN:1/25 s)" if step > 1.0 else "s already"
-        what = f"rows are {step:.4g} s apart (median), {ROW_STEPS[0]:g} to {ROW_STEPS[1]:g} s are read"
-        raise FormatError(f"{what}; the clock may be in {unit}", path=path, element="column 'time'")
 
 
 def seconds_of_stamps(

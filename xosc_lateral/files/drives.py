@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.drivers.drives import evidence
 from xosc_lateral.drivers.drives.cleaning import (
     DRIVE_COLUMNS,
     LANE_WIDTHS,
@@ -23,6 +24,7 @@ from xosc_lateral.drivers.drives.cleaning import (
     RUN,
     VALID_BELOW,
     clean_drive,
+    position,
 )
 from xosc_lateral.drivers.drives.drive import MIN_RUN, Drive
 from xosc_lateral.drivers.drives.identity import clock_runs
@@ -47,6 +49,7 @@ LABELS = ("drive", "driver", "recording")  # columns that say which drive a row 
 STANDARD = {
     **{name: (name,) for name in (*sorted(DRIVE_COLUMNS - {RUN, VALID_BELOW, RESOLUTION}), *CONTEXT_UNITS)},
     "recording": ("recording", "recording_id", "case_id", "scenario_id"),
+    "drive": ("drive", "drive_id", "trip", "trip_id", "session", "session_id", "ride", "ride_id", "vin", "vehicle_id"),
 }
 """Name -> headers, in any spelling and with units."""
 
@@ -119,8 +122,13 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
         what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
         raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
+    every = list(rows_of_drives(table, path))
+    if RUN not in columns:  # an import knows its own
+        require_evidence(
+            columns, every, path, is_named="time" in mapping.columns and bool(mapping.columns["time"].unit)
+        )
     drives = []
-    for name, rows in rows_of_drives(table, path):
+    for name, rows in every:
         drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path, lost)
         drivers = list(table["driver"].iloc[rows].dropna().unique()) if "driver" in table.columns else []
         if len(drivers) > 1:
@@ -132,6 +140,33 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
         what = f"no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
         raise NotEnoughDataError(f"{path}: {what}")
     return drives
+
+
+def require_evidence(
+    columns: Mapping[str, FloatArray], drives: Sequence[tuple[str, NDArray[np.intp]]], path: Path, *, is_named: bool
+) -> None:
+    """Refuse drives whose rows contradict their clock, each other, or the unit and side of their offset."""
+    offset, width = position(columns)
+    jumps, steps = [np.zeros(0)], [np.zeros(0)]
+    for name, rows in drives:
+        mine = rows[np.isfinite(columns["time"][rows])]
+        mine = mine[np.argsort(columns["time"][mine], kind="stable")]
+        time = columns["time"][mine]
+        if len(mine) < 2:
+            continue
+        if wrong := evidence.of_clock(time, is_named=is_named):
+            raise FormatError(f"drive {name}: {wrong}", path=path, element="column 'time'")
+        if (count := evidence.in_turns(offset[mine])) > 1:
+            what = f"rows of {count} vehicles or drives in turns; which is whose, drive=COLUMN says"
+            raise FormatError(f"drive {name}: {what}", path=path, element="column 'offset'")
+        lane = columns["lane_index"][mine] if "lane_index" in columns else None
+        for all_of, found in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
+            all_of.append(found)
+    known = np.isfinite(offset + width)
+    if known.any():
+        farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))
+        if wrong := evidence.of_lane_changes(np.concatenate(jumps), np.concatenate(steps), median, farthest):
+            raise FormatError(wrong, path=path, element="column 'offset'")
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:

@@ -233,7 +233,18 @@ def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
 
 def _source(name: str, words: str) -> ColumnSource:
     column, colon, unit = words.rpartition(":")
-    return ColumnSource(column, factor(name, unit), unit) if colon else ColumnSource(words)
+    return ColumnSource(column, factor(name, unit), unit) if colon and "]" not in unit else from_header(name, words)
+
+
+def from_header(name: str, header: str, unit: str | None = None) -> ColumnSource:
+    """A column in the unit that its header names. Raises `ValueError`: one in brackets measures something else."""
+    unit = parts_of(header)[1] if unit is None else unit
+    try:
+        return ColumnSource(header, factor(name, unit) if unit else 1.0, unit)
+    except ValueError:
+        if "[" in header or "(" in header:
+            raise
+        return ColumnSource(header)
 
 
 def standard_sources(
@@ -258,10 +269,9 @@ def standard_sources(
             elif header in bare:
                 column, unit = bare[header]
                 try:
-                    sources[name] = ColumnSource(column, factor(name, unit) if unit else 1.0, unit)
+                    sources[name] = from_header(name, column, unit)
                 except ValueError as error:
-                    if "[" in column or "(" in column:
-                        raise FormatError(str(error), path=path, element=f"column {column!r}") from error
+                    raise FormatError(str(error), path=path, element=f"column {column!r}") from error
             elif strange := next((text for text in whole.values() if re.match(rf"{header}\s*\[", text, re.I)), None):
                 what = f"unknown unit; known: {', '.join(UNITS)}: --map {name}=COLUMN:UNIT names it"
                 raise FormatError(what, path=path, element=f"column {strange!r}")

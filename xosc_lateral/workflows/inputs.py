@@ -44,8 +44,8 @@ def scenario_input(scenario: DocumentLike, road: RoadLike | None = None, name: s
 
     Raises `TypeError`: neither can be that; `FormatError`: scenariogeneration can't write its object, or no such file.
     """
-    in_memory = _document(scenario, "scenario")
-    of_road = None if road is None or isinstance(road, Mapping) else _document(road, "road")
+    in_memory = document(scenario, "scenario")
+    of_road = None if road is None or isinstance(road, Mapping) else document(road, "road")
     if in_memory is None and not isinstance(road, Mapping) and of_road is None:
         return ScenarioInput(scenarios_at(scenario)[0], None if road is None else local(road))
     if in_memory is None:
@@ -98,16 +98,18 @@ def _named_in(scenario: Path) -> set[Path]:
 
 def several(stated: Any) -> list[Any]:
     """One of them, or several."""
-    is_list = isinstance(stated, Sequence) and not isinstance(stated, str | bytes | bytearray | memoryview)
+    is_list = isinstance(stated, list | tuple | Sequence) and not isinstance(
+        stated, str | bytes | bytearray | memoryview
+    )
     return list(stated) if is_list and not ElementTree.iselement(stated) else [stated]
 
 
 def _bytes(stated: Any, what: str) -> bytes:
-    data = _document(stated, what)
+    data = document(stated, what)
     return read_source(local(stated)).data if data is None else data
 
 
-def _document(stated: Any, what: str) -> bytes | None:
+def document(stated: Any, what: str) -> bytes | None:
     """Bytes of a file; None for a path."""
     if isinstance(stated, bytes | bytearray | memoryview):
         return bytes(stated)

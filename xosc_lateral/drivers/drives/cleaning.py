@@ -15,6 +15,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive
+from xosc_lateral.drivers.drives.evidence import of_clock
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -71,9 +72,9 @@ def clean_drive(
     columns = _in_order(columns, name, path, lost)
     if RUN not in columns:
         _require_opposite(columns, name, path)
-        place = np.isfinite(_position(columns)[0])
+        place = np.isfinite(position(columns)[0])
         columns = {key: _bridged(key, columns, levels, place) for key in columns}
-    offset, lane_width = _position(columns)
+    offset, lane_width = position(columns)
     _check_units(name, columns, offset, lane_width, path)
     narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
     good = np.isfinite(offset) & np.isfinite(lane_width) & ~narrow
@@ -197,27 +198,25 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path, lost: Count
     def refuse(what: str) -> None:
         raise FormatError(f"drive {name}: {what}", path=path, element="column 'time'")
 
-    clock = "if the clock is in milliseconds: --map time=COLUMN:ms"
     latest, span = float(np.abs(time[[0, -1]]).max()), float(time[-1] - time[0])
     for limit, duration in ((TIME, latest), (DRIVE_SPAN, span)):
         if duration > limit.value:
-            refuse(f"{limit.refusal(duration)}; {clock}")
+            refuse(limit.refusal(duration))
     repeated = np.concatenate([[False], np.diff(time) <= 0])
     lost["repeated time"] += int(repeated.sum())
-    offset, later = _position(columns)[0], np.flatnonzero(repeated)
+    offset, later = position(columns)[0], np.flatnonzero(repeated)
     apart = int((np.abs(offset[later] - offset[later - 1]) > CONTRADICTION_DISTANCE).sum())
     if apart > max(5, MAX_CONTRADICTIONS * len(time)):
         refuse(
             f"{apart} of {len(time)} rows repeat a time with another offset; if the table holds several drives it "
             "needs a column 'drive'"
         )
-    steps = np.diff(time[~repeated])
-    if len(steps) and np.median(steps) > MAX_STEP:
-        refuse(f"rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; {clock}")
+    if wrong := of_clock(time[~repeated], MAX_STEP, is_named=True):
+        refuse(wrong)
     return {key: values[~repeated] for key, values in columns.items()}
 
 
-def _position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+def position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Offset, positive to the left (far from the right marking), and lane width. [m]"""
     if {"offset", "lane_width"} <= columns.keys():
         return columns["offset"], columns["lane_width"]

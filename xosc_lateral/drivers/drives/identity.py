@@ -30,6 +30,7 @@ FROZEN_SPEED = 3.0  # who moves as fast before or after can't have stood there w
 HARDEST_BRAKING = 10.0  # dry asphalt allows no more: what speeds may differ by between rows that are far apart [m/s2]
 GLITCH_ROWS = 2  # so few rows between two leaps are an error of places, no vehicle
 NAMED = 20  # so many vehicles are named that leap
+COARSE = 0.8  # so many rows repeat a time only where five and more have one stamp: two recordings are half [-]
 REPEATED_DISTANCE, MOST_REPEATED = 2.0, 0.01  # one vehicle at two places at once [m], in so many of its rows [-]
 
 
@@ -137,6 +138,8 @@ def identify(
         name = names[int(vehicle[rows[later[int(places.argmax())]]])]
         what = f"vehicle {name} is at two places at once, {places.max():.4g} m apart, as {apart} of {len(time)} rows"
         advice = "several recordings in one need a column that names them, recording=COLUMN"
+        if apart > COARSE * len(time):
+            advice = "its clock is too coarse, as seconds since 1970 are in seven digits or 32 bits"
         raise FormatError(f"{what} show: {advice}", path=path)
     rows = rows[~repeated]
     new = np.r_[True, (np.diff(code[rows]) != 0) | (np.diff(vehicle[rows]) != 0)] if len(rows) else np.zeros(0, bool)

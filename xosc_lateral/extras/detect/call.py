@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input, several
+from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, ScenarioInput, scenario_input, several
+from xosc_lateral.workflows.opened import HeldPath, is_document, opened, opened_as_one
 from xosc_lateral.workflows.options import PathLike, Paths, declare_options, flag
 from xosc_lateral.workflows.options import paths as as_paths
 
@@ -112,7 +113,12 @@ def detect(
 
     inputs = [
         scenario_input(one, road, f"scenario_{number}" if number > 1 else "scenario")
+        if is_document(one)
+        else ScenarioInput(
+            path, None if road is None else opened_as_one(road), path.held if isinstance(path, HeldPath) else None
+        )
         for number, one in enumerate(several(sources), start=1)
+        for path in (opened(one, f"table {number}") if not is_document(one) else [Path()])
     ]
     paths, homes, trainers = [one.path for one in inputs], as_paths(home), as_paths(train)
     if not paths:

@@ -90,11 +90,12 @@ def name_states(
         code[cut] = k
     kept = code == 0
     run = _kept_runs(kept, lane, vehicle, time)
-    count = np.bincount(run)
-    place = np.arange(len(run)) - (np.cumsum(count) - count)[run]
-    edge = round(settings.edge / step)
-    code[kept & ((place < edge) | (place >= count[run] - edge))] = len(reasons) + 1
-    code[kept & ((count - 2 * edge) * step < settings.shortest)[run]] = len(reasons) + 2
+    first = np.flatnonzero(np.diff(run, prepend=-1))
+    begin, end = time[first], time[np.r_[first[1:], len(run)][: len(first)] - 1]
+    own = (end - begin) / np.maximum(np.bincount(run) - 1, 1)  # a row stands for its step
+    edge = settings.edge - 0.5 * own[run]
+    code[kept & ((time - begin[run] < edge) | (end[run] - time < edge))] = len(reasons) + 1
+    code[kept & (end - begin + own - 2 * settings.edge < settings.shortest - 1e-6)[run]] = len(reasons) + 2
     names = pd.Index([KEPT_ROWS, *reasons, "edge", "short"])
     return pd.Categorical.from_codes(code, categories=names)
 
@@ -193,15 +194,22 @@ def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str,
 
 def require_along_lanes(
     network: RoadNetwork, x: FloatArray, y: FloatArray, heading: FloatArray, speed: FloatArray, path: Path
-) -> None:
-    """Refuse places in the coordinates of a road's file that drive against its lanes. [m], [rad], [m/s]"""
+) -> tuple[FloatArray, FloatArray]:
+    """Refuse places in the coordinates of a road's file that drive against its lanes; else their offsets to the left of
+    the lane's direction and its widths, NaN in none. [m], [rad], [m/s]"""
     near = np.flatnonzero(np.abs(x) + np.abs(y) < WITHIN_EARTH)
     place = network.world_to_lane(x[near], y[near], heading=heading[near])
     inside = (place.distance <= 0.0) & (place.lane != 0)
     lane = network.lane_to_world(place.road[inside], place.lane[inside], place.s[inside])
-    agreement = np.full(len(near), np.nan)
-    agreement[inside] = np.cos(heading[near][inside] - lane.heading)
-    require_lane_direction(agreement, speed[near], Path(network.path).name or "its lanes", path)
+    agreement, offset, width = np.full((3, len(x)), np.nan)
+    there = near[inside]
+    agreement[there] = np.cos(heading[there] - lane.heading)
+    offset[there], width[there] = (
+        place.offset[inside],
+        network.lane_width(place.road[inside], place.lane[inside], place.s[inside]),
+    )
+    require_lane_direction(agreement, speed, Path(network.path).name or "its lanes", path)
+    return offset, width
 
 
 def is_right_to_left(

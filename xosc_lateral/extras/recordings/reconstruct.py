@@ -37,8 +37,8 @@ from xosc_lateral.extras.recordings.scenario import reconstructed_scenario
 from xosc_lateral.extras.recordings.settings import ReconstructKeywords, ReconstructSettings
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.profiles import find_profile, list_profiles, read_profile
-from xosc_lateral.files.remote import local
 from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
+from xosc_lateral.workflows.opened import opened_as_one
 from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.result import PathLike
 from xosc_lateral.world.surroundings.lane_order import RoadLanes
@@ -79,7 +79,13 @@ def reconstruct(
     """
     settings = ReconstructSettings(**values_of(ReconstructSettings, options))
     kind, road, case = settings.format, settings.road, settings.case
-    traffic = read_recording(local(recording), kind=kind, road=road, columns=columns, recording=case)
+    traffic = read_recording(
+        opened_as_one(recording, columns),
+        kind=kind,
+        road=None if road is None else opened_as_one(road),
+        columns=columns,
+        recording=case,
+    )
     result = reconstruct_recording(traffic, settings)
     if output is not None:
         result.write(output, force=force)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
+from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import require_along_lanes
 from xosc_lateral.extras.recordings.importers import dlr_ht, dlr_ut, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
@@ -19,6 +20,7 @@ from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, T
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
+from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
@@ -86,7 +88,7 @@ def read_recordings(
     kind = kind or format_of(source)
     if kind not in (*READERS, "tracks"):
         raise FormatError(f"no recording format {kind!r}; there are {', '.join((*READERS, 'tracks'))}", path=source)
-    if not source.exists():
+    if not exists(source):
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
         if kind == "tracks":
@@ -108,7 +110,7 @@ def format_of(source: Path) -> str:
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
         return "dlr-ut" if "urban" in name else "dlr-ht"
-    if source.is_dir() or name.endswith("_tracks.csv"):
+    if source.is_dir() and any(source.glob("*_tracks.csv")) or _is_levelx(source):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
@@ -155,6 +157,12 @@ def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     return replace(_on_road(read_fcd(source), source, None, made), sources=(source, road))
 
 
+def _is_levelx(source: Path) -> bool:
+    """A recording of levelX has its meta beside it."""
+    name = source.name
+    return name.lower().endswith("_tracks.csv") and source.with_name(f"{name[:-10]}_recordingMeta.csv").exists()
+
+
 def name_of(source: Path) -> str:
     """Of what is made from a recording."""
     return source.name.split(".")[0]
@@ -171,7 +179,8 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
     every = slice(None, None, max(1, len(x) // GATE_ROWS))
-    require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
+    place = require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
+    shift = of_registration(*place, tracks.vehicle[every])
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
     label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""
@@ -182,7 +191,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
         data,
         road_name,
         sources,
-        (*tracks.notes, *notes),
+        (*tracks.notes, *notes, *([shift] if shift else [])),
         host=None,
         label=label,
         dropped=tracks.dropped,

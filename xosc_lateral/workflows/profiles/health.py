@@ -17,10 +17,10 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError, NotEnoughD
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
-from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.tables import read_table
+from xosc_lateral.workflows.opened import opened
 from xosc_lateral.workflows.options import Paths, declare_options
-from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, as_paths, given_drives, write_page
+from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, given_drives, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -46,7 +46,7 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     """
     from xosc_lateral.base.extras import service
 
-    files, stated = tuple(inputs_of(as_paths(drives))), as_mapping(columns)
+    files, stated = tuple(opened(drives, "DataFrame")), as_mapping(columns)
     seen, left = service("recognised")([read_table(path, stated) for path in files], files[-1])
     proposal = service("mapping_text")(files, stated, seen, left)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))

@@ -31,11 +31,11 @@ from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.files.drives import file_label, file_labels
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
-from xosc_lateral.files.remote import inputs_of
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
+from xosc_lateral.workflows.opened import opened, opened_as_one
 from xosc_lateral.workflows.options import declare_options
-from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
+from xosc_lateral.workflows.result import PathLike, Paths, Result
 
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
@@ -91,7 +91,7 @@ def import_drives(
     FormatError
         An unknown format, or a source that can't be read.
     """
-    sources = tuple(inputs_of(as_paths(source)))
+    sources = (opened_as_one(source, options.get("mapping")),) if format == "tracks" else tuple(opened(source, "table"))
     if not sources:
         raise ValueError("no source to import")
     read = find_importer(format)
@@ -186,14 +186,15 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
 
     `dropped` in it: rows of the source that are not in the table, by reason.
     """
-    states = table["state"].value_counts()
+    states, kept = table["state"].value_counts(), table["state"] == KEPT_ROWS
+    own = table.groupby("drive", sort=False)["time"].diff().groupby(table["drive"], sort=False).median().fillna(step)
     counts = Counter({str(state): int(count) for state, count in states.items()}) + Counter(about.pop("dropped", {}))
     record = ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
         rows=dict(sorted(counts.items())),
         vehicles=int(table["drive"].nunique()),
-        hours=round(float((table["state"] == KEPT_ROWS).sum()) * step / 3600.0, 3),
+        hours=round(float(own.reindex(table.loc[kept, "drive"]).sum()) / 3600.0, 3),
         **about,
     )
     return ImportedDrives(table, record)

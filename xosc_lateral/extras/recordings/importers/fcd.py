@@ -28,7 +28,6 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, i
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of_rows
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane
 from xosc_lateral.files import sumo
-from xosc_lateral.files.columns import require_row_step
 from xosc_lateral.workflows.options import flag
 from xosc_lateral.world.surroundings.lane_order import LaneGraph, neighbour_columns
 
@@ -113,7 +112,6 @@ def _drive_table(
     piece = np.array([numbers.get(name, -1) for name in rows["lane"]])
     passed = np.diff(time)[np.diff(vehicle) == 0]
     step = float(np.median(passed)) if len(passed) else 1.0
-    require_row_step(step, source)
     middle = rows["pos"].to_numpy() - 0.5 * length
     near = neighbour_columns(graph, piece, middle, time, vehicle, step, speed, length, is_truck)
     return pd.DataFrame({

@@ -18,6 +18,8 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
+from xosc_lateral.drivers.drives import evidence
+from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED
 from xosc_lateral.drivers.drives.identity import apart_in_time, identify
 from xosc_lateral.extras.recordings.cuts import MOVING_SPEED, require_headings
 from xosc_lateral.files.columns import (
@@ -27,7 +29,6 @@ from xosc_lateral.files.columns import (
     listed,
     no_time,
     numbers_of,
-    require_row_step,
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import (
@@ -128,6 +129,8 @@ def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray)
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
     """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
     saved = as_mapping(mapping)
+    if path.is_dir():
+        return tracks_of(read_table(path, saved), path, columns, saved)
     with open_source(path) as source:
         is_log = unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
     # no name holds the table: it goes as soon as its columns are taken
@@ -147,11 +150,9 @@ def tracks_of(
     time = rows.pop("time").to_numpy()
     if (factor := epoch_factor(time)) != 1.0:
         time = time * factor
-    order = np.lexsort((time, codes))
-    steps = np.diff(time[order])[np.diff(codes[order]) == 0]
-    if (steps > 0.0).any():  # in a wrong unit, all that moves leaps
-        require_row_step(float(np.median(steps[steps > 0.0])), path)
-    del order, steps
+    is_named = is_log or is_played or "speed" in rows or rows.attrs["names time"]
+    if wrong := evidence.of_clock(time[np.lexsort((time, codes))], is_named=is_named):  # all that moves would leap
+        raise FormatError(wrong, path=path, element="column 'time'")
     kind, usual, recording = np.full(len(time), ""), np.full(len(time), 4.6), None
     if "recording" in rows:
         recording = rows.pop("recording")
@@ -170,7 +171,6 @@ def tracks_of(
     tracks, _ = tracks_of_rows(
         list(map(str, labels)), codes, more, path, recording=recording, dropped=lost, is_believed=is_played or is_log
     )
-    require_row_step(tracks.step, path)
     x, y = tracks.x, tracks.y
     if behind := BEHIND_MIDDLE[saved.reference]:
         ahead = behind * tracks.length
@@ -207,19 +207,32 @@ def tracks_of_rows(
     if not is_believed:
         require_headings(heading, way, driven, path)
         _require_speed(speed, driven, path)
+        if wrong := evidence.of_sizes(columns["length"], columns.get("width")):
+            raise FormatError(wrong, path=path, element="columns 'length', 'width'")
+    clock, ahead = apart_in_time(time, known.recording, step), np.nan_to_num(columns.get("rear", np.zeros(len(x))))
+    middle = x + ahead * np.cos(heading), y + ahead * np.sin(heading)
+    notes = evidence.of_vehicles(
+        known.names, whose, clock, *middle, heading, columns["length"], columns.get("width"), step
+    )
     tracks = Tracks(
         known.names, whose, time, step, x, y, heading, speed, recordings=known.recordings,
         recording=known.recording if len(known.recordings) > 1 else None,
-        dropped={**dropped, **known.dropped}, notes=known.notes, **columns,
+        dropped={**dropped, **known.dropped}, notes=(*known.notes, *notes), **columns,
     )  # fmt: skip
     return tracks, order
 
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
-    moving = (driven > MOVING_SPEED) & (speed > 0.0)
+    moving = (np.maximum(driven, speed) > MOVING_SPEED) & (np.minimum(driven, speed) > 0.0)
+    if moving.any() and (usual := float(np.median(driven[moving]))) > MAX_MEDIAN_SPEED and (speed == driven).all():
+        raise FormatError(
+            f"traffic moves at {usual:.4g} m/s: x and y may be in ft (x=COLUMN:ft, y=COLUMN:ft)", path=path
+        )
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
         return
+    if abs(np.log(ratio / 1e3)) < np.log(MAX_SPEED_RATIO):
+        raise FormatError("x and y may be in km (x=COLUMN:km, y=COLUMN:km), or time in ms", path=path)
     units = {unit: abs(np.log(ratio * by)) for unit, (kind, by) in UNITS.items() if kind == "speed"}
     unit = min(units, key=lambda name: units[name])
     close = units[unit] < np.log(MAX_SPEED_RATIO) and unit != "m/s"
@@ -265,6 +278,7 @@ def _columns(
             numbers[np.isinf(numbers)] = np.nan
             columns[name] = pd.Series(numbers, index=column.index)
     every = pd.DataFrame(columns, copy=False)
+    every.attrs["names time"] = bool(mapping.get("time", by_name.get("time", ColumnSource("time"))).unit)
     placed = np.asarray(every[["vehicle", "time", "x", "y"]].notna().to_numpy().all(axis=1))
     made = every if placed.all() else every.loc[placed]
     lost = {"not chosen": read - len(every), "no place or time": len(every) - len(made)}

@@ -22,6 +22,8 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rates import rate
 from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
+from xosc_lateral.drivers.drives.drive import MAX_GAP
+from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import (
     DEFAULT_CUTS,
     LANE_AGREEMENT,
@@ -121,11 +123,15 @@ def import_placed(
     placed: PlacedTracks, graph: LaneGraph, settings: CutSettings, *, only: Collection[str] | None = None, **about: Any
 ) -> ImportedDrives:
     """Neighbours, cuts and record, see `imported`; of the vehicles in `only` alone, if it is given."""
+    if placed.tracks.step > MAX_GAP:
+        what = f"rows are {placed.tracks.step:.4g} s apart (median): from {MAX_GAP:g} s on no drive can be made of them"
+        raise FormatError(what, path=about["sources"][0], element="column 'time'")
     table = _drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
     tracks = placed.tracks
-    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes)))
+    shift = of_registration(placed.offset, placed.lane_width, tracks.vehicle)
+    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes, *([shift] if shift else []))))
     return imported(
         table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
     )  # fmt: skip

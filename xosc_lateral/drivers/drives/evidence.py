@@ -1,0 +1,207 @@
+"""What a recording says of its own signs, units, clock, places and vehicles: asked once, by all doors.
+
+Each question gives a line with the option that mends it, or None. What contradicts itself is refused by who asks; what
+only makes results worse is a note. Limits are where the two readings part, not how far real driving goes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
+
+LEAST_JUMPS = 2  # lane changes that say the same
+AGREED = 0.75  # of them, at least: cameras and maps that count lanes change at another row than the offset now and then
+JUMP_WINDOW = 1.0  # lane numbers change up to so long before or after the offset jumps [s]
+FASTEST_ASIDE = 3.0  # no vehicle moves sideways as fast: what does between two rows is another lane [m/s]
+BEYOND_NOISE = 10.0  # times as far as from row to row: 7 standard deviations of noise [-]
+SYMMETRIC = 0.25  # the offset before a jump is that after it on the other side, give or take so much of the jump
+WIDTH_KEPT = 0.1  # of a lane's width that it may change by where the lane does: else a marking was misjudged
+SIZE_AGREED = 0.15  # a row's way aside in a lane change is no more of a lane's width; units are a factor of 3 apart
+UNIT_SIZES = {"cm": 1e2, "mm": 1e3, "ft": 1.0 / 0.3048, "km": 1e-3}
+ALTERNATING = (
+    2.0  # white noise differs from row to row as over several rows (1), driving less; two vehicles in turns more
+)
+MOST_IN_TURNS = 8
+FASTEST_STEP, SLOWEST_STEP = 9.5e-4, 2.0  # 1 kHz and its jitter; what comes every 2 s shows no movement in a lane [s]
+USUAL_WIDTH = 1.8  # [m]
+FARTHEST_MEAN = 0.42  # two standard deviations of the mean offsets of 445 vehicles on a motorway: no traffic's mean [m]
+LEAST_VEHICLES = 5
+SURE = 2.0  # standard errors
+
+
+# ---- signs and units, by lane changes --------------------------------------------------------------------------------
+def jumps_of(
+    time: FloatArray, offset: FloatArray, width: FloatArray, lane: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Jumps of one drive's offset from one marking to the other, to the left above 0, shape (k,); [m] and how many
+    lanes `lane` steps to the left about then (NaN: none, or several times)."""
+    good = np.isfinite(time + offset + width)
+    time, offset, width = time[good], offset[good], width[good]
+    jump, step = np.diff(offset), np.diff(time)
+    if not len(jump):
+        return jump, jump
+    least = np.maximum(FASTEST_ASIDE * step, BEYOND_NOISE * np.median(np.abs(jump)))
+    leap = (np.abs(jump) > least) & (step <= JUMP_WINDOW)
+    leap &= np.abs(offset[1:] + offset[:-1]) < SYMMETRIC * np.abs(jump)
+    leap &= np.abs(np.diff(width)) < WIDTH_KEPT * np.minimum(width[1:], width[:-1])
+    at = np.flatnonzero(leap)
+    steps = np.full(len(at), np.nan)
+    if lane is not None and len(at):
+        known = np.flatnonzero(np.isfinite(lane[good]))
+        moved = np.diff(lane[good][known])
+        when = time[known[1:]][moved != 0.0]
+        for k, one in enumerate(at.tolist()):
+            near = moved[moved != 0.0][np.abs(when - time[one]) <= JUMP_WINDOW]
+            steps[k] = near[0] if len(near) == 1 else np.nan
+    return jump[at], steps
+
+
+def of_lane_changes(jumps: FloatArray, steps: FloatArray, width: float, farthest: float) -> str | None:
+    """What lane changes of all drives say of the offset's unit and side; `width` as believed, `farthest`: the offset is
+    hardly ever farther from 0. [m]"""
+    sizes = {"m": width, "lane widths": 1.0, **{unit: width * by for unit, by in UNIT_SIZES.items()}}
+    fits = {unit: np.abs(np.log(np.abs(jumps) / size)) < SIZE_AGREED for unit, size in sizes.items()}
+    unit = max(fits, key=lambda name: int(fits[name].sum()))
+    count = int(fits[unit].sum())
+    if count < max(LEAST_JUMPS, AGREED * len(jumps)):
+        return None
+    if unit != "m":
+        if farthest > (0.5 + WIDTH_KEPT) * sizes[unit]:
+            return None
+        option = f"{width:.4g} m" if unit == "lane widths" else unit
+        what = f"{count} lane changes move it by {sizes[unit]:.3g}, in lanes of {width:.3g} m: it is in {unit}"
+        return f"{what}, offset=COLUMN:{option}"
+    side = (np.sign(jumps) * np.sign(steps))[fits[unit] & np.isfinite(steps)]
+    wrong = int((side > 0.0).sum())  # to the left, by a lane more from the right, the offset jumps to the right
+    if wrong < max(LEAST_JUMPS, AGREED * len(side)):
+        return None
+    what = f"in {wrong} of {len(side)} lane changes the offset jumps to the side that lane_index steps to"
+    return f"{what}: it is positive to the right (offset=COLUMN:-m), or lane_index counts from the left"
+
+
+# ---- who is who, and when --------------------------------------------------------------------------------------------
+def in_turns(values: FloatArray) -> int:
+    """How many vehicles rows come from in turns: 1, where neighbours are as alike as rows farther apart."""
+    known = values[np.isfinite(values)]
+    if len(known) < 100:
+        return 1
+    apart = [float(np.median(np.abs(known[k:] - known[:-k]))) for k in range(1, MOST_IN_TURNS + 1)]
+    return next((k for k, change in enumerate(apart, start=1) if apart[0] > ALTERNATING * change), 1)
+
+
+def of_clock(time: FloatArray, slowest: float = SLOWEST_STEP, *, is_named: bool = False) -> str | None:
+    """What times of one vehicle after the other say, each sorted, in s, `slowest` apart at most; `is_named`: their unit is."""
+    step = np.diff(time)
+    step = step[step > 0.0]
+    if not len(step):
+        return None
+    usual = float(np.median(step))
+    minutes = np.abs(step - 40.5) < 0.5 + 2.0 * usual  # from 59 to 100
+    if usual < 1.0 and minutes.any() and time.min() > 1e3 and (np.mod(time, 100.0) < 60.0).all():
+        return "never ends in 60 to 99: clock times such as HHMMSS; write 14:03:05.2, or count seconds"
+    if not FASTEST_STEP <= usual <= slowest:
+        units = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "86400 s": 86400.0}
+        likely = min(units, key=lambda unit: abs(np.log(usual * units[unit] / 0.05)))
+        frames = ", or count frames (time=COLUMN:1/25 s)" if usual >= 1.0 else ""
+        known = f"rows are {usual:.4g} s apart (median), {FASTEST_STEP:g} to {slowest:g} s are read"
+        return f"{known}; the clock may be in {likely} (time=COLUMN:{likely}){frames}"
+    if not is_named and (step == 1.0).mean() > 0.9 and (time == np.round(time)).all():
+        return "whole numbers one apart: frames (time=COLUMN:1/25 s), ms (time=COLUMN:ms), or seconds (time=COLUMN:s)"
+    return None
+
+
+# ---- places ----------------------------------------------------------------------------------------------------------
+def of_registration(offset: FloatArray, width: FloatArray, vehicle: IntArray) -> str | None:
+    """Whether all traffic lies to one side of its lanes, which is the map's error; one that lies in the next lane, too."""
+    good = np.isfinite(offset + width)
+    turn = np.exp(2j * np.pi * offset[good] / width[good])
+    names, whose = np.unique(vehicle[good], return_inverse=True)
+    if len(names) < LEAST_VEHICLES:
+        return None
+    count = np.bincount(whose)
+    mean = (np.bincount(whose, turn.real) + 1j * np.bincount(whose, turn.imag)) / count
+    lane = float(np.median(width[good]))
+    middle = float(np.angle(mean.mean()))
+    each = middle + np.angle(mean * np.exp(-1j * middle))
+    shift, error = (float(value) * lane / (2.0 * np.pi) for value in (each.mean(), each.std() / np.sqrt(len(each))))
+    if abs(shift) - SURE * error < FARTHEST_MEAN:
+        return None
+    side = "left" if shift > 0.0 else "right"
+    return (
+        f"traffic of {len(names)} vehicles lies {abs(shift):.2f} +- {2.0 * error:.2f} m to the {side} of its lanes' centres: "
+        "the road and the tracks are shifted against one another, and lane changes are not to be believed"
+    )
+
+
+def of_noise(x: FloatArray, y: FloatArray, heading: FloatArray, vehicle: IntArray) -> str | None:
+    """Whether places are too noisy for lane changes: who is settled looks as if not, in 3 rows of 1000."""
+    if len(x) < 100:
+        return None
+    way = heading[1:-2]
+    third = (np.cos(way) * np.diff(y, 3) - np.sin(way) * np.diff(x, 3))[vehicle[3:] == vehicle[:-3]]
+    sd = 1.4826 * float(np.nanmedian(np.abs(third))) / np.sqrt(20.0) if np.isfinite(third).any() else 0.0
+    most = SETTLED_OFFSET / 3.0
+    return (
+        None
+        if sd <= most
+        else f"places err by {sd:.2f} m from row to row: above {most:.2f} m lane changes are invented"
+    )
+
+
+# ---- vehicles against each other -------------------------------------------------------------------------------------
+def of_sizes(length: FloatArray, width: FloatArray | None) -> str | None:
+    """Whether lengths and widths are exchanged, or in another unit."""
+    known = np.isfinite(length) & (length > 0.0)
+    if width is not None and (both := known & np.isfinite(width) & (width > 0.0)).any():
+        if (share := float((width[both] > length[both]).mean())) > 0.5:
+            return f"{100 * share:.0f} % of the vehicles are wider than long: length and width are exchanged"
+    if known.any() and (median := float(np.median(length[known]))) > 60.0:
+        return f"vehicles are {median:.4g} m long: length=COLUMN:{'cm' if median < 6000.0 else 'mm'}"
+    return None
+
+
+def overlaps(
+    time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray, length: FloatArray, width: FloatArray,
+    vehicle: IntArray, step: float,
+) -> Mapping[tuple[int, int], float]:  # fmt: skip
+    """Pairs of vehicles of which one's middle lies in the other, and how long: sizes may be wrong by half. [s]"""
+    from scipy.spatial import cKDTree
+
+    good = np.flatnonzero(np.isfinite(time + x + y + heading))
+    instant = np.round((time[good] - time[good].min()) / step) if len(good) else np.zeros(0)
+    apart = 1e3
+    tree = cKDTree(np.column_stack([x[good] - x[good].mean(), y[good] - y[good].mean(), instant * apart]))
+    first, second = good[tree.query_pairs(8.0, output_type="ndarray")].T if len(good) else (good, good)
+    other = vehicle[first] != vehicle[second]
+    first, second = first[other], second[other]
+    over = np.zeros(len(first), dtype=np.bool_)
+    for one, other_one in ((first, second), (second, first)):
+        c, s = np.cos(heading[one]), np.sin(heading[one])
+        dx, dy = x[other_one] - x[one], y[other_one] - y[one]
+        over |= (np.abs(c * dx + s * dy) < 0.5 * length[one]) & (np.abs(c * dy - s * dx) < 0.5 * width[one])
+    a, b = np.minimum(vehicle[first], vehicle[second])[over], np.maximum(vehicle[first], vehicle[second])[over]
+    pairs, count = np.unique(np.column_stack([a, b]), axis=0, return_counts=True)
+    return {(int(i), int(j)): n * step for (i, j), n in zip(pairs.tolist(), count.tolist(), strict=True)}
+
+
+def of_vehicles(
+    names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray,
+    length: FloatArray, width: FloatArray | None, step: float,
+) -> list[str]:  # fmt: skip
+    """Who is there twice, who drives through whom, and noise: a line each."""
+    wide = np.full(len(x), USUAL_WIDTH) if width is None else width
+    lines = [line] if (line := of_noise(x, y, heading, vehicle)) else []
+    begin, end = (np.searchsorted(vehicle, np.arange(len(names)), side=side) for side in ("left", "right"))
+    lasting = time[end - 1] - time[begin]
+    pairs = overlaps(time, x, y, heading, length, wide, vehicle, step)
+    twice = {pair for pair, seconds in pairs.items() if seconds > 0.5 * min(lasting[k] for k in pair)}
+    lines += [
+        f"{names[b]} lies in {names[a]} for {pairs[a, b]:.1f} s: the same vehicle twice" for a, b in sorted(twice)
+    ]
+    met = Counter(k for pair in pairs.keys() - twice for k in pair)
+    return lines + [f"{n} vehicles drive through {names[k]}: no vehicle is there" for k, n in met.items() if n > 1]

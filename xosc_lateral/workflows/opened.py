@@ -1,0 +1,92 @@
+"""One opening for whatever stands for inputs: each becomes a path, on a disk or in memory, so that readers know files."""
+
+from __future__ import annotations
+
+import io
+import os
+from glob import has_magic
+from pathlib import Path, PosixPath, WindowsPath
+from typing import Any, TypeAlias
+
+from xosc_lateral.drivers.drives.drive import Drive
+from xosc_lateral.files.held import Held, hold
+from xosc_lateral.files.mapping import MappingLike, as_mapping
+from xosc_lateral.files.remote import inputs_of
+from xosc_lateral.files.tables import frame_of, read_table
+from xosc_lateral.workflows.inputs import document, several
+
+InputLike: TypeAlias = Any
+"""A path, URL, pattern or folder; bytes, text or a file-like object; a data frame, a `Drive`, a result of ours."""
+
+KINDS = {b"PAR1": ".parquet", b"ARROW1": ".feather", b"<": ".xml", b"\xef\xbb\xbf<": ".xml"}
+
+
+class HeldPath(WindowsPath if os.name == "nt" else PosixPath):  # type: ignore[misc]
+    """A path in memory that keeps what lies there."""
+
+    held: Held
+
+
+def opened(stated: InputLike, name: str = "input") -> list[Path]:
+    """Paths of all that is stated, in order."""
+    items = several(stated)
+    paths = list[Path]()
+    for number, one in enumerate(items, start=1):
+        label = name if len(items) == 1 else f"{name} {number}"
+        if isinstance(one, str | os.PathLike) and not str(one).lstrip("\ufeff \t\r\n").startswith("<"):
+            paths += inputs_of([one])  # type: ignore[list-item]
+        else:
+            paths.append(_in_memory(one, label))
+    return paths
+
+
+def opened_as_one(stated: InputLike, columns: MappingLike | None = None, name: str = "recording") -> Path:
+    """The only path, or that of a table of which the stated ones are parts."""
+    paths = opened(stated, name)
+    if len(paths) == 1:
+        return paths[0]
+    import pandas as pd
+
+    mapping = as_mapping(columns)
+    return _in_memory(pd.concat([read_table(path, mapping) for path in paths], ignore_index=True), name)
+
+
+def _in_memory(one: InputLike, name: str) -> Path:
+    made = getattr(one, "data", None)  # of a conversion
+    data = made if isinstance(made, bytes) else _frame_bytes(one)
+    if data is None:
+        data = document(one, name)
+        assert data is not None
+    stem = Path(str(getattr(one, "name", "") or name)).name if hasattr(one, "read") else name
+    ending = next((end for magic, end in KINDS.items() if data.startswith(magic)), ".csv")
+    file = stem if Path(stem).suffix else f"{stem}{'.xosc' if b'<OpenSCENARIO' in data[:4096] else ending}"
+    held = hold({file: data})
+    path = HeldPath(held.folder / file)
+    path.held = held
+    return path
+
+
+def _frame_bytes(one: InputLike) -> bytes | None:
+    """Bytes of a table that is in memory; None: it is none."""
+    if isinstance(one, Drive):
+        one = {"time": one.time, "offset": one.offset, **one.context, "drive": [one.name] * len(one)}
+    elif hasattr(one, "headline"):
+        one = one.to_frame()
+    try:
+        frame = frame_of(one)
+    except TypeError:
+        return None
+    import pyarrow.feather as feather
+
+    out = io.BytesIO()
+    feather.write_feather(frame.rename(columns=str).reset_index(drop=True), out, compression="uncompressed")
+    return out.getvalue()
+
+
+def is_document(one: InputLike) -> bool:
+    """Whether it is a scenario, or a path or folder of some, and no table in memory."""
+    if isinstance(one, bytes | bytearray | memoryview):
+        return bytes(one[:64]).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
+    if isinstance(one, str | os.PathLike) or hasattr(one, "read"):
+        return not has_magic(str(one)) or hasattr(one, "read")
+    return not isinstance(one, Drive) and not hasattr(one, "headline") and _frame_bytes(one) is None
