@@ -1,4 +1,4 @@
-"""One opening for whatever stands for inputs: each becomes a path, on a disk or in memory, so that readers know files."""
+"""One opening for whatever stands for inputs: each becomes a path, on disk or in memory; readers know files."""
 
 from __future__ import annotations
 

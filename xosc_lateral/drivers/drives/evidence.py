@@ -95,7 +95,7 @@ def in_turns(values: FloatArray) -> int:
 
 
 def of_clock(time: FloatArray, slowest: float = SLOWEST_STEP, *, is_named: bool = False) -> str | None:
-    """What times of one vehicle after the other say, each sorted, in s, `slowest` apart at most; `is_named`: their unit is."""
+    """What sorted times, one vehicle after the other, say, at most `slowest` apart; `is_named`: with a unit. [s]"""
     step = np.diff(time)
     step = step[step > 0.0]
     if not len(step):
@@ -117,7 +117,7 @@ def of_clock(time: FloatArray, slowest: float = SLOWEST_STEP, *, is_named: bool 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
 def of_registration(offset: FloatArray, width: FloatArray, vehicle: IntArray) -> str | None:
-    """Whether all traffic lies to one side of its lanes, which is the map's error; one that lies in the next lane, too."""
+    """Whether all traffic lies to one side of its lanes, as far as the next lane: an error of the map."""
     good = np.isfinite(offset + width)
     turn = np.exp(2j * np.pi * offset[good] / width[good])
     names, whose = np.unique(vehicle[good], return_inverse=True)
@@ -133,7 +133,8 @@ def of_registration(offset: FloatArray, width: FloatArray, vehicle: IntArray) ->
         return None
     side = "left" if shift > 0.0 else "right"
     return (
-        f"traffic of {len(names)} vehicles lies {abs(shift):.2f} +- {2.0 * error:.2f} m to the {side} of its lanes' centres: "
+        f"traffic of {len(names)} vehicles lies {abs(shift):.2f} +- {2.0 * error:.2f} m to the {side} of its lanes' "
+        "centres: "
         "the road and the tracks are shifted against one another, and lane changes are not to be believed"
     )
 
@@ -157,9 +158,10 @@ def of_noise(x: FloatArray, y: FloatArray, heading: FloatArray, vehicle: IntArra
 def of_sizes(length: FloatArray, width: FloatArray | None) -> str | None:
     """Whether lengths and widths are exchanged, or in another unit."""
     known = np.isfinite(length) & (length > 0.0)
-    if width is not None and (both := known & np.isfinite(width) & (width > 0.0)).any():
-        if (share := float((width[both] > length[both]).mean())) > 0.5:
-            return f"{100 * share:.0f} % of the vehicles are wider than long: length and width are exchanged"
+    wide = np.full_like(length, np.nan) if width is None else width
+    both = known & np.isfinite(wide) & (wide > 0.0)
+    if both.any() and (share := float((wide[both] > length[both]).mean())) > 0.5:
+        return f"{100 * share:.0f} % of the vehicles are wider than long: length and width are exchanged"
     if known.any() and (median := float(np.median(length[known]))) > 60.0:
         return f"vehicles are {median:.4g} m long: length=COLUMN:{'cm' if median < 6000.0 else 'mm'}"
     return None

@@ -201,7 +201,7 @@ def _beside_products(selection: Selection) -> Selection:
             continue
         described = term.describe(selection.final, selection.final.effects_of(term), "")
         change = 0.0 if described.ends is None else described.ends.change
-        if described.ends is not None and abs(change) < NORMAL_95 * described.ends.error or not change:
+        if (described.ends is not None and abs(change) < NORMAL_95 * described.ends.error) or not change:
             selection = selection.without([term], BY_PRODUCT)
     return selection
 

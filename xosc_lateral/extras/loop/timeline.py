@@ -276,10 +276,10 @@ class Coarse:
         quantity = effect.known({name: np.full(1, value) for name, value in held.items()})[0]
         if effect.episode:
             quantity = np.where(np.abs(quantity) >= effect.episode, quantity, 0.0)
-        gain = sum(weight for _, weight in effect.course) if effect.course else 1.0
-        return (
-            np.clip(gain * quantity, *np.asarray(effect.response_range).T) if effect.response_range else gain * quantity
-        )
+        settled = quantity * (sum(weight for _, weight in effect.course) if effect.course else 1.0)
+        if effect.response_range:
+            settled = np.clip(settled, *np.asarray(effect.response_range).T)
+        return np.asarray(settled, dtype=np.float64)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""

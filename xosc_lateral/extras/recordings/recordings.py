@@ -110,7 +110,7 @@ def format_of(source: Path) -> str:
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
         return "dlr-ut" if "urban" in name else "dlr-ht"
-    if source.is_dir() and any(source.glob("*_tracks.csv")) or _is_levelx(source):
+    if (source.is_dir() and any(source.glob("*_tracks.csv"))) or _is_levelx(source):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
