@@ -2,7 +2,7 @@
 
 __version__ = "0.2.0"
 
-BEHAVIOUR = 8
+BEHAVIOUR = 9
 """What decides the bytes of an output from the same inputs, settings and seed: playing, sampling, writing.
 
 It grows by one with every change of those bytes, so that batches make anew what an older program wrote, and no more.
