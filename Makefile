@@ -43,6 +43,7 @@ demo: $(STAMP)
 style: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-logo
 
 # Tests of names, pages and links; `tests/test_names.py` keeps the list of their files.
 LINT := $(addprefix tests/,test_names.py test_layers.py test_examples.py docs/test_pages.py world/player/test_documented.py)

@@ -5,7 +5,6 @@ Everything listed in `__all__` is promised (`docs/api.md`) and loaded when it is
 
 from __future__ import annotations
 
-from xosc_lateral.base import extras as _extras
 from xosc_lateral.base.version import __version__
 
 TYPE_CHECKING = False  # importing `typing` for it would take longer than all the rest
@@ -49,8 +48,7 @@ _HOME = {
     "NotEnoughDataError": "base.errors",
     "SimulationError": "base.errors",
 }
-_HOME |= _extras.table("CALLS")
-"""Public name -> module that has it; calls of extras by their registry."""
+"""Public name -> module that has it; those of extras are found when they are asked for."""
 
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
@@ -158,11 +156,17 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> object:
     """Load a public name."""
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    if name in _HOME:
+        home = f"{__name__}.{_HOME[name]}"
+    else:
+        from xosc_lateral.base.plugins import offered
+
+        home = "" if name.startswith("_") else offered("CALLS").get(name, "")
+        if not home:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(home), name)
     globals()[name] = value
     return value
 

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 import xosc_lateral as xl
-from xosc_lateral.base.extras import table
+from xosc_lateral.base.plugins import offered
 from xosc_lateral.cli import VERB_MODULES, VERBS, app, verb
 
 HEAVY = ("matplotlib", "numba", "pandas", "scipy", "scenariogeneration", "pyarrow", "joblib", "sklearn", "rich")
@@ -44,8 +44,9 @@ def test_nothing_is_loaded_to_say_what_there_is(words: list[str], tmp_path: Path
     light = {
         "base",
         "base.errors",
-        "base.extras",
+        "base.plugins",
         "extras",
+        *(f"extras.{name}" for name in ("detect", "dossier", "live", "loop", "recordings")),
         "base.limits",
         "base.names",
         "base.signals",
@@ -88,5 +89,5 @@ def test_every_module_of_the_command_line_is_a_verb_or_shared() -> None:
     with_verb = {
         path.stem for path in folder.glob("*.py") if "app = group_of_verbs()" in path.read_text(encoding="utf-8")
     }
-    verbs = {verb: VERB_MODULES.get(verb, verb.replace("-", "_")) for verb in VERBS.keys() - table("VERBS")}
+    verbs = {verb: VERB_MODULES.get(verb, verb.replace("-", "_")) for verb in VERBS.keys() - offered("VERBS")}
     assert with_verb == set(verbs.values())

@@ -261,10 +261,12 @@ def test_a_log_names_files_and_ends_with_its_command(tmp_path, capsys):
 
 
 def test_every_verb_names_a_page_that_exists():
+    from xosc_lateral.base.plugins import offered
     from xosc_lateral.cli.words import DOCS_PAGES
 
     root = Path(__file__).resolve().parents[2]
-    assert {page for pages in DOCS_PAGES.values() for page in pages.split(", ") if not (root / page).exists()} == set()
+    told = [*DOCS_PAGES.values(), *(pages for *_, pages in offered("VERBS").values())]
+    assert {page for pages in told for page in pages.split(", ") if not (root / page).exists()} == set()
     assert set(DOCS_PAGES) | {"__init__", "words"} == {
         path.stem for path in (root / "xosc_lateral" / "cli").glob("*.py")
     }

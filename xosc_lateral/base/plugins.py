@@ -10,7 +10,10 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, TypeVar
 
-GROUPS = ("xosc_lateral.effects", "xosc_lateral.importers", "xosc_lateral.templates", "xosc_lateral.profiles")
+EXTRAS = "xosc_lateral.extras"
+"""Where our own extras are, and the entry point group of those of other packages."""
+
+GROUPS = ("xosc_lateral.effects", "xosc_lateral.importers", "xosc_lateral.templates", "xosc_lateral.profiles", EXTRAS)
 """Entry point groups that are looked at."""
 
 
@@ -44,6 +47,24 @@ def plugins(group: str) -> dict[str, Any]:
 def plugin_names(group: str) -> tuple[str, ...]:
     """Names of what `plugins` would load, nothing loaded."""
     return tuple(sorted(point.name for point in entry_points(group=group)))
+
+
+@lru_cache(maxsize=None)
+def offered(table: str) -> dict[str, Any]:
+    """What extras offer in a table of theirs (`xosc_lateral/extras/__init__.py`): ours, then those of other packages."""
+    try:
+        folder = import_module(EXTRAS).__path__
+    except ModuleNotFoundError:  # the core alone
+        folder = []
+    ours = [import_module(f"{EXTRAS}.{found.name}") for found in iter_modules(folder)]
+    return {
+        name: told for each in (*ours, *plugins(EXTRAS).values()) for name, told in getattr(each, table, {}).items()
+    }
+
+
+def service(name: str) -> Any:
+    """What a verb of the core has an extra do, loaded."""
+    return getattr(import_module(offered("SERVICES")[name]), name)
 
 
 T = TypeVar("T")

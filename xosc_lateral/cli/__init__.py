@@ -14,9 +14,9 @@ from typing import Annotated, Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from xosc_lateral.base import extras
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
+from xosc_lateral.base.plugins import offered
 from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.source import guarding_inputs
@@ -36,8 +36,10 @@ VERBS = {
     "template": "Scenarios to start from.",
     "vary": "A scenario's lane changes as long as real ones.",
 }
-VERBS |= {name: does for name, (_, does) in extras.table("VERBS").items()}
-"""Name -> what it does; those of extras behind those of the core."""
+for _name, (_, _does, _before, _) in offered("VERBS").items():
+    _first = [*VERBS].index(_before) if _before else len(VERBS)
+    VERBS = dict([*list(VERBS.items())[:_first], (_name, _does), *list(VERBS.items())[_first:]])
+"""Name -> what it does; those of extras where they say."""
 
 VERB_MODULES = {
     "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
@@ -82,8 +84,7 @@ def group_of_verbs() -> typer.Typer:
 
 def home(name: str) -> str:
     """Module of a verb."""
-    inside = VERB_MODULES.get(name, name.replace("-", "_"))
-    return f"xosc_lateral.{extras.table('VERBS').get(name, [f'cli.{inside}'])[0]}"
+    return offered("VERBS").get(name, [f"xosc_lateral.cli.{VERB_MODULES.get(name, name)}"])[0]
 
 
 @cache

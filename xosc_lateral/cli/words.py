@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hi
 
 import typer
 
-from xosc_lateral.base import extras
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
+from xosc_lateral.base.plugins import offered
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
 
 if TYPE_CHECKING:
@@ -286,7 +286,8 @@ def command(group: typer.Typer, name: str, short: str, *examples: str, cls: Any 
     """Add a verb to a group, with examples and its page at the end of its help; `cli.verb` gives it its options."""
 
     def add(verb: Verb) -> Verb:
-        page = (DOCS_PAGES | extras.table("PAGES"))[verb.__module__.removeprefix("xosc_lateral.").removeprefix("cli.")]
+        pages = DOCS_PAGES | {home: pages for home, _, _, pages in offered("VERBS").values()}
+        page = pages[verb.__module__.removeprefix("xosc_lateral.cli.")]
         lines = "".join(f"\n  xosc-lateral {line}" for line in examples)
         epilog = f"\b\nExamples:{lines}\n\n\b\nMore: {page}"
         group.command(name, cls=cls, short_help=short, epilog=epilog)(verb)

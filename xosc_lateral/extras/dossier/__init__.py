@@ -1,1 +1,14 @@
 """Evidence for an assessor: claims, what tests them, and what they are tested to be here."""
+
+VERBS = {
+    "dossier": (
+        "xosc_lateral.extras.dossier.verb",
+        "Evidence for an assessor.",
+        "template",
+        "docs/how_to/in_your_pipeline.md",
+    ),
+}
+CALLS = {
+    "dossier": "xosc_lateral.extras.dossier.call",
+    "Dossier": "xosc_lateral.extras.dossier.call",
+}

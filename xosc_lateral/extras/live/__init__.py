@@ -1,1 +1,17 @@
 """`live` and `export`: the driver as a part of somebody else's running simulation."""
+
+VERBS = {
+    "live": ("xosc_lateral.extras.live.verbs", "Drivers in a simulation that runs.", None, "docs/live.md"),
+    "export": ("xosc_lateral.extras.live.verbs", "Drivers as parts for other tools.", None, "docs/live.md"),
+}
+CALLS = {
+    "live_esmini": "xosc_lateral.extras.live.call",
+    "live_sumo": "xosc_lateral.extras.live.call",
+    "Traffic": "xosc_lateral.extras.live.traffic",
+    "Moment": "xosc_lateral.extras.live.traffic",
+    "EsminiTraffic": "xosc_lateral.extras.live.esmini",
+    "SumoTraffic": "xosc_lateral.extras.live.sumo",
+    "export_c": "xosc_lateral.extras.live.c_driver",
+    "export_fmu": "xosc_lateral.extras.live.fmu",
+    "LiveRun": "xosc_lateral.extras.live.call",
+}

@@ -1,1 +1,27 @@
 """`import` and `reconstruct`: other people's recordings into drives, and into scenarios."""
+
+VERBS = {
+    "import": (
+        "xosc_lateral.extras.recordings.import_verb",
+        "Convert recordings into drive tables.",
+        "profiles",
+        "docs/real_data.md, docs/formats.md",
+    ),
+    "reconstruct": (
+        "xosc_lateral.extras.recordings.reconstruct_verb",
+        "Turn a recording into a maneuver-based scenario.",
+        "verify",
+        "docs/how_to/from_a_recording.md",
+    ),
+}
+CALLS = {
+    "reconstruct": "xosc_lateral.extras.recordings.reconstruct",
+    "import_drives": "xosc_lateral.extras.recordings.importers",
+    "Reconstruction": "xosc_lateral.extras.recordings.reconstruction",
+    "ImportedDrives": "xosc_lateral.extras.recordings.importers",
+}
+SERVICES = {
+    "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
+    "recognised": "xosc_lateral.extras.recordings.importers.foreign_table",
+    "mapping_text": "xosc_lateral.extras.recordings.importers.foreign_table",
+}

@@ -123,7 +123,7 @@ def fit(
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
         profile = replace(profile, model=correct_two_level(profile.model), provenance=provenance)
     if maneuvers is not None:
-        from xosc_lateral.base.extras import service
+        from xosc_lateral.base.plugins import service
         from xosc_lateral.files.source import parsed_hashes
 
         recording = Path(maneuvers)

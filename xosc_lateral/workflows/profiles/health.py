@@ -44,7 +44,7 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     FormatError
         Only where there is no table at all: what is wrong with one is part of the result.
     """
-    from xosc_lateral.base.extras import service
+    from xosc_lateral.base.plugins import service
 
     files, stated = tuple(opened(drives, "DataFrame")), as_mapping(columns)
     seen, left = service("recognised")([read_table(path, stated) for path in files], files[-1])
