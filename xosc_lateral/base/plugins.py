@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
@@ -49,9 +49,9 @@ def plugin_names(group: str) -> tuple[str, ...]:
     return tuple(sorted(point.name for point in entry_points(group=group)))
 
 
-@lru_cache(maxsize=None)
+@cache
 def offered(table: str) -> dict[str, Any]:
-    """What extras offer in a table of theirs (`xosc_lateral/extras/__init__.py`): ours, then those of other packages."""
+    """What extras offer in a table (`xosc_lateral/extras/__init__.py`): ours, then those of other packages."""
     try:
         folder = import_module(EXTRAS).__path__
     except ModuleNotFoundError:  # the core alone

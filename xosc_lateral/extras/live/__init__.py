@@ -1,8 +1,18 @@
 """`live` and `export`: the driver as a part of somebody else's running simulation."""
 
 VERBS = {
-    "live": ("xosc_lateral.extras.live.verbs", "Drivers in a simulation that runs.", None, "docs/live.md"),
-    "export": ("xosc_lateral.extras.live.verbs", "Drivers as parts for other tools.", None, "docs/live.md"),
+    "live": (
+        "xosc_lateral.extras.live.verbs",
+        "Drivers in a simulation that runs.",
+        "",
+        "docs/live.md",
+    ),
+    "export": (
+        "xosc_lateral.extras.live.verbs",
+        "Drivers as parts for other tools.",
+        "",
+        "docs/live.md",
+    ),
 }
 CALLS = {
     "live_esmini": "xosc_lateral.extras.live.call",
