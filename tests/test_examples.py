@@ -30,14 +30,8 @@ def notebook_code() -> str:
     return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
 
 
-LOOPS = pytest.mark.pages
-"""README's walk closes a loop in `make test`; the same by an example is for `make pages`."""
-
-
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, id=path.stem, marks=[LOOPS] if path.stem == "close_the_loop" else []) for path in EXAMPLES],
-)
+@pytest.mark.pages
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs(path, tmp_path, capsys, monkeypatch):
     monkeypatch.syspath_prepend(str(path.parent))  # as `python examples/NAME.py` does
     runpy.run_path(str(path))["main"](tmp_path)

@@ -42,6 +42,7 @@ def test_the_first_commands_set_up_check_and_activate():
     assert said == [["make", "demo"], ["make", "test"], ["source", ".venv/bin/activate"]]
 
 
+@pytest.mark.pages
 @pytest.mark.slow
 def test_every_command_runs_as_printed_in_a_new_shell(checkout):
     lines = commands()

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -26,6 +27,9 @@ NEEDED = {
     "live sumo": "libsumo",
 }  # fmt: skip
 """Words of an example -> the package of the extra that it takes."""
+
+WORN = ("close-loop", "dossier", "vary")
+"""Verbs whose own tests run them from the command line as they are, at more length."""
 
 PLAYER = "libesminiLib.so"
 """Somebody else's program: its examples are read as far as where it would be loaded."""
@@ -201,8 +205,16 @@ MADE: dict[str, Callable[[Path], object]] = {
 """Files that examples read -> how they are made; the first words of an example are no output."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line", examples())
+def with_tiers() -> list[Any]:
+    """The first example of every verb is a smoke test of `make test`; all others are run by `make pages`."""
+    verbs = [line.split()[1] for line in examples()]
+    return [
+        pytest.param(line, marks=[] if verbs.index(name) == k and name not in WORN else [pytest.mark.pages])
+        for k, (line, name) in enumerate(zip(examples(), verbs, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("line", with_tiers())
 def test_an_example_of_a_help_runs(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     for words, package in NEEDED.items():
         if words in line and find_spec(package) is None:

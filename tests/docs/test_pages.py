@@ -45,8 +45,6 @@ RUN = (
     "pipeline.md",
     "api.md",
 )
-FOR_PAGES = {"tutorials/researcher.md": pytest.mark.pages, "how_to/derive_a_driver.md": pytest.mark.pages}
-"""Run by `make pages`, begun here: README's walk closes a loop, the help's examples derive."""
 RECORDING, SIMULATOR, HOUR = "a recording that is not shipped", "another program", "an hour of work"
 EXCERPT = "an excerpt or a drawing: nothing to run"
 NOT_RUN = {
@@ -90,8 +88,9 @@ def run_line(line: str) -> None:
     assert main(arguments) == 0, line
 
 
+@pytest.mark.pages
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [pytest.param(page, marks=FOR_PAGES.get(page, ())) for page in RUN])
+@pytest.mark.parametrize("page", RUN)
 def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
     if page == "how_to/osi.md":
         pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
@@ -138,12 +137,10 @@ class BegunError(Exception):
 
 
 def begun_commands() -> list[tuple[str, str]]:
-    """Commands of this project that no test runs whole: in blocks for other programs or long work, and in the text."""
+    """Commands of this project, in blocks and in the text: `make pages` runs those of `RUN` whole."""
     found = []
     for page in [page for page in PAGES if page != "CHANGELOG.md"]:  # it names commands in short
-        run = page == "README.md" or page.removeprefix("docs/") in {*RUN} - {*FOR_PAGES}
-        kinds = ("text",) if run else ("", "sh", "text")
-        lines = [line.split("  #")[0] for kind, text in blocks(page) if kind in kinds for line in text.splitlines()]
+        lines = [line.split("  #")[0] for kind, text in blocks(page) if kind in ("", "sh", "text") for line in text.splitlines()]
         prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
         lines += re.findall(r"`((?:python|make) [^`]+)`", prose)
         found += [(page, line.strip()) for line in lines if re.match(r"(xosc-lateral|python|make) ", line)]
