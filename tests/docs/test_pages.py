@@ -140,7 +140,12 @@ def begun_commands() -> list[tuple[str, str]]:
     """Commands of this project, in blocks and in the text: `make pages` runs those of `RUN` whole."""
     found = []
     for page in [page for page in PAGES if page != "CHANGELOG.md"]:  # it names commands in short
-        lines = [line.split("  #")[0] for kind, text in blocks(page) if kind in ("", "sh", "text") for line in text.splitlines()]
+        lines = [
+            line.split("  #")[0]
+            for kind, text in blocks(page)
+            if kind in ("", "sh", "text")
+            for line in text.splitlines()
+        ]
         prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
         lines += re.findall(r"`((?:python|make) [^`]+)`", prose)
         found += [(page, line.strip()) for line in lines if re.match(r"(xosc-lateral|python|make) ", line)]

@@ -65,3 +65,26 @@ def deferring_signals() -> Iterator[None]:
 def pending_signal() -> int | None:
     """The signal that was noted."""
     return _pending
+
+
+class TimeOver(BaseException):
+    """The time of a block is over; no `except Exception` on the way holds it up."""
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Raise `TimeOver` in the block after so long; without effect in a thread, and where systems have no such alarm."""
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def over(number: int, frame: FrameType | None) -> None:
+        raise TimeOver
+
+    before = signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

@@ -84,7 +84,7 @@ def group_of_verbs() -> typer.Typer:
 
 def home(name: str) -> str:
     """Module of a verb."""
-    return offered("VERBS").get(name, [f"xosc_lateral.cli.{VERB_MODULES.get(name, name)}"])[0]
+    return str(offered("VERBS").get(name, [f"xosc_lateral.cli.{VERB_MODULES.get(name, name)}"])[0])
 
 
 @cache

@@ -9,6 +9,7 @@ import os
 import re
 import secrets
 import stat
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -160,7 +161,9 @@ def _temporary_beside(path: Path, suffix: str) -> Iterator[Path]:
     temporary = path.with_name(name)
     descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
-        _lock(descriptor)
+        if sys.platform != "win32":  # where a lock keeps the writer itself out
+            with contextlib.suppress(OSError):
+                lock(descriptor)
         yield temporary
     finally:
         os.close(descriptor)
@@ -171,13 +174,19 @@ def _temporary_beside(path: Path, suffix: str) -> Iterator[Path]:
                 folder.rmdir()
 
 
-def _lock(descriptor: int) -> bool:
-    """Take a file's lock, which ends with the process; False: somebody holds it, or the system has none."""
+def lock(descriptor: int) -> bool:
+    """Take the lock of an open file without waiting, which ends with the process; False: somebody else has it."""
     try:
-        import fcntl
+        if sys.platform == "win32":
+            import msvcrt
 
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (ImportError, OSError):
+            os.lseek(descriptor, 4096, os.SEEK_SET)  # beyond what is written there, which others must be able to read
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
         return False
     return True
 
@@ -196,7 +205,7 @@ def mend(outputs: Iterable[Path]) -> None:
         mine = [path for path, match in matches.items() if match is not None and match[1] in wanted]
         for path in sorted(mine, key=lambda path: path.suffix != _PLAN):
             with contextlib.suppress(OSError, FormatError), open_own(path, flags=0) as file:
-                if not _lock(file.fileno()):
+                if sys.platform == "win32" or not lock(file.fileno()):
                     continue
                 if path.suffix == _PLAN:
                     with contextlib.suppress(

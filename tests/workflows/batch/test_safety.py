@@ -29,7 +29,7 @@ from xosc_lateral.workflows.conversion import convert as convert_module
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX links and signals")
 
-NOT_YET = sorted({*packages_distributions(), "joblib", "pickle", "numpy", "typer"} - {"xosc_lateral"})
+NOT_YET = sorted({*packages_distributions(), "pickle", "numpy", "typer"} - {"xosc_lateral"})
 """Names of modules that are imported after our own first line."""
 
 

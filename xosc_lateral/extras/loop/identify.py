@@ -20,6 +20,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.process import cores
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.loop.autocorrelation import Whitener
@@ -336,8 +337,6 @@ def nest(
     progress: Callable[[float], None] = lambda _: None,
 ) -> Nested:
     """Select anew without each fold: by the table's levels, and then at least as many terms as were `found` there."""
-    from joblib import cpu_count
-
     coarse, blocks = search.coarse, hold_out_blocks(search.coarse.timeline)
     seconds, folds = coarse_middle(blocks)[: len(coarse)], folds_of(blocks)
     # what happened once can't be found without the block in which it happened: what judges the others knows when
@@ -355,7 +354,7 @@ def nest(
 
     pairs = []
     # threads: the work is in compiled code that lets others run, and all folds read the same candidates
-    with ThreadPoolExecutor(min(folds, cpu_count())) as pool:
+    with ThreadPoolExecutor(min(folds, cores())) as pool:
         for pair in pool.map(selected, range(folds)):
             pairs.append(pair)
             progress(len(pairs) / folds)

@@ -25,7 +25,7 @@ from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_
 from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
 from xosc_lateral.workflows.batch.journal import STATE_FOLDER, Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, Timing, read_manifest
-from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
+from xosc_lateral.workflows.batch.workers import Pool, WorkerDiedError, open_pool, run_tasks
 
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
@@ -93,11 +93,13 @@ def convert_many(
     Raises `FolderInUseError`: another run writes into the folder; `BatchStoppedError`: the folder can't be written, the
     disk is full; `ClusterError`: the cluster can't be reached, is gone, or has another version of this package.
     """
-    work = partial(_run_job, converter or convert_job, limits or JobLimits())
+    limits = limits or JobLimits()
+    work = partial(_run_job, converter or convert_job, limits)
     new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
     try:
         try:
-            yield from _outcomes(batch, work, workers, cluster, keep_old, notify or (lambda line: None))
+            pool = partial(open_pool, cluster=cluster, limits=limits)
+            yield from _outcomes(batch, work, workers, pool, keep_old, notify or (lambda line: None))
         except OSError as error:
             if error.errno not in (errno.EROFS, errno.EACCES):
                 raise
@@ -116,7 +118,7 @@ def _outcomes(
     batch: Batch,
     work: Callable[[str, Job], _Reply],
     workers: int,
-    cluster: str | None,
+    open_pool: Callable[[int], Pool],
     keep_old: bool,
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
@@ -147,7 +149,7 @@ def _outcomes(
                 journal.add(row, timing)
             yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
         if todo:
-            with deferring_signals(), open_pool(min(workers, len(todo)), cluster) as pool:
+            with deferring_signals(), open_pool(min(workers, len(todo))) as pool:
                 for job, reply in run_tasks(pool, partial(work, runs[0]), (job for job, _ in todo.values())):
                     outcome = _noted(job, reply, journal, todo[job.name][1])
                     failed |= {job.output.parent} if outcome.row.error else set()

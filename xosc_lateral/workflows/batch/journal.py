@@ -7,7 +7,6 @@ import os
 import re
 import secrets
 import socket
-import sys
 import time
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.atomic import open_own
+from xosc_lateral.files.atomic import lock, open_own
 from xosc_lateral.workflows.batch import manifest
 from xosc_lateral.workflows.batch.manifest import MANIFEST, TIMINGS, ManifestRow, Timing
 
@@ -77,7 +76,7 @@ def _open_locked(path: Path, wait: float) -> IO[bytes]:
             file = open_own(path)
         except FileNotFoundError:
             continue  # a run that just ended has taken the folder away again
-        if not _lock(file):
+        if not lock(file.fileno()):
             values = _stated(file)
             file.close()
             if time.monotonic() < end:
@@ -95,23 +94,6 @@ def _open_locked(path: Path, wait: float) -> IO[bytes]:
         except FileNotFoundError:
             pass
         file.close()  # its owner has removed it between our opening and locking it
-
-
-def _lock(file: IO[bytes]) -> bool:
-    """Take the operating system's lock without waiting; False: another process has it."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            file.seek(4096)  # beyond what is written there, which others must be able to read
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except (BlockingIOError, PermissionError):
-        return False
-    return True
 
 
 CLOCK_TICK = 20_000_000

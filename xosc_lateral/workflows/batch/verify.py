@@ -158,7 +158,7 @@ def verify(
     search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
     tasks = list(enumerate(_tasks(as_paths(outputs))))
     checked: dict[int, Checked] = {}
-    with open_pool(min(workers, len(tasks)), None) as pool:
+    with open_pool(min(workers, len(tasks)), None, JobLimits()) as pool:
         for (number, task), defects in run_tasks(pool, partial(_defects, search, fast), tasks):
             if isinstance(defects, WorkerDiedError):
                 defects = [(Problem.FAILED, str(defects))]

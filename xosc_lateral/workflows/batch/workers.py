@@ -1,28 +1,32 @@
-"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
+"""Where jobs run: in this process, in processes on this machine's cores, on a dask.distributed cluster.
 
-Workers may die: what was lost is tried again, what kills its worker is found. joblib's `Parallel` is not in between
-because it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
+Each task runs in a process with limits (`base/process.py`), also on a cluster: one that takes its process down costs
+its own row, and is tried again, for a process may be killed from outside as well.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import signal
-import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import contextmanager
+from concurrent.futures import (
+    ALL_COMPLETED,
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
+from functools import cache
 from itertools import islice
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 from xosc_lateral.base.errors import XoscLateralError
-from xosc_lateral.base.signals import ENDING, Interrupted, pending_signal
+from xosc_lateral.base.process import ProcessEndedError, Processes, cores
+from xosc_lateral.base.signals import Interrupted, pending_signal
 from xosc_lateral.base.version import __version__
-from xosc_lateral.workflows.batch.guard import let_worker_die
+from xosc_lateral.workflows.batch.guard import JobLimits
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -30,11 +34,14 @@ Result = TypeVar("Result")
 TASKS_AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
 
-LONG_TRY = 60.0
-"""A task that was alone and worked for so long before its worker died is not tried again: that was no accident. [s]"""
+TRIES = 4
+"""Times that a task may take its process, or its machine, down."""
 
-TRIES_ALONE = 3
-"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
+LONG_TRY = 60.0
+"""A task that worked for so long before its process died is not tried again: that was no accident. [s]"""
+
+ENDING_TIME = 30.0
+"""A job that has not ended so long after it was told to is killed with its process. [s]"""
 
 CHECK_EVERY = 5.0
 """How often it is looked whether a pool that does not answer still has workers. [s]"""
@@ -51,13 +58,45 @@ class ClusterError(XoscLateralError):
 
 
 class WorkerDiedError(XoscLateralError):
-    """A task took down its worker, time and again."""
+    """A task took down its worker, time and again, or did not end."""
+
+
+def _processes() -> Processes:
+    # one thread each for libraries of numpy and numba: as many processes as cores are busy already
+    environment = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    return Processes("xosc_lateral.base.process:serve", environment)
+
+
+_of_this_machine = cache(_processes)
+"""Of a cluster's worker, whose threads share them."""
+
+
+def in_process(
+    processes: Processes | None, limits: JobLimits, work: Callable[[Task], Result], task: Task
+) -> Result | WorkerDiedError:
+    """``work(task)`` in a process of its own; an error where that ends time and again, or does not end."""
+    begin, seconds = time.monotonic(), limits.timeout + ENDING_TIME
+    processes = processes or _of_this_machine()
+    for _ in range(TRIES):
+        try:
+            return cast(Result, processes.call(work, task, seconds=seconds, megabytes=limits.memory))
+        except ProcessEndedError as ended:
+            if ended.late:
+                return WorkerDiedError(limits.too_long)
+        if time.monotonic() - begin > LONG_TRY:
+            break
+    return _died()
+
+
+def _died() -> WorkerDiedError:
+    return WorkerDiedError("its worker process died time and again (killed, out of memory, or a crash in a library)")
 
 
 class Pool:
     """Workers, used as a context: here none, a task runs in this process when it is handed out."""
 
-    tries_alone = TRIES_ALONE
+    def __init__(self, limits: JobLimits) -> None:
+        self._limits = limits
 
     def __enter__(self) -> Self:
         return self
@@ -69,110 +108,38 @@ class Pool:
         """How many tasks may be handed out at once."""
         return 1
 
-    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result | WorkerDiedError]:
         """Hand out a task."""
-        future: Future[Result] = Future()
+        future: Future[Result | WorkerDiedError] = Future()
         future.set_result(work(task))
         return future
 
-    def recover(self) -> None:
-        """Get fit again after a worker died; raises `ClusterError` if that can't be."""
-
     def lost(self, error: BaseException) -> bool:
-        """Whether a future's error means that its worker died, rather than that the task raised it."""
+        """Whether a future's error means that its machine is gone, rather than that the task raised it."""
         return False
 
     def check(self) -> None:
         """Raise `ClusterError` when no result can come any more; called every few seconds without one."""
 
 
-PARENT_CHECK = 0.5
-"""How often a worker looks whether its run is still there. [s]"""
-
-PR_SET_PDEATHSIG = 1
-"""Of Linux's prctl(2), from <linux/prctl.h>: the signal that this process gets when its parent ends."""
-
-
 class _LocalProcesses(Pool):
-    """So many worker processes of joblib's executor (loky), which sees by itself when one is gone."""
+    """So many processes on this machine, a thread waiting for each."""
 
-    def __init__(self, count: int) -> None:
-        self._count = count
-        self._executor = self._start()
+    def __init__(self, limits: JobLimits, count: int) -> None:
+        super().__init__(limits)
+        self._count, self._threads, self._processes = count, ThreadPoolExecutor(count), _processes()
 
     def __exit__(self, *raised: object) -> None:
-        self._executor.shutdown(wait=True, kill_workers=raised[1] is not None)
+        if raised[1] is not None:
+            self._processes.end()
+        self._threads.shutdown(cancel_futures=True)
+        self._processes.end()
 
     def capacity(self) -> int:
         return TASKS_AHEAD * self._count
 
-    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        with _safe_path():
-            future: Future[Result] = self._executor.submit(work, task)
-        return future
-
-    def recover(self) -> None:
-        self._executor.shutdown(wait=True, kill_workers=True)
-        self._executor = self._start()
-
-    def lost(self, error: BaseException) -> bool:
-        return isinstance(error, BrokenExecutor)
-
-    def _start(self) -> Any:
-        from joblib.externals.loky import ProcessPoolExecutor
-
-        # One thread each for numpy's and numba's libraries: as many workers as cores are busy already.
-        environment = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")} | {_SAFE: "1"}
-        if sys.platform != "win32":
-            from multiprocessing.resource_tracker import ensure_running
-
-            with _safe_path():
-                ensure_running()  # it unblocks signals: before workers start, which are to have them blocked
-        with _safe_path():
-            return ProcessPoolExecutor(
-                max_workers=self._count, env=environment, initializer=_end_with_parent, initargs=(os.getpid(),)
-            )
-
-
-_SAFE = "PYTHONSAFEPATH"
-
-
-@contextmanager
-def _safe_path() -> Iterator[None]:
-    """Python processes that start meanwhile import nothing from the working folder, which may be anybody's.
-
-    Workers are told in their own environment; joblib's process that tracks their resources has this one's. And no
-    signal that a terminal sends to everybody reaches them: the run decides what becomes of its workers.
-    """
-    before = os.environ.get(_SAFE)
-    os.environ[_SAFE] = "1"
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING) if hasattr(signal, "pthread_sigmask") else None
-    try:
-        yield
-    finally:
-        if mask is not None:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        del os.environ[_SAFE]
-        if before is not None:
-            os.environ[_SAFE] = before
-
-
-def _end_with_parent(parent: int) -> None:
-    """End this worker with its run, even if that was killed: on Linux at once, so that nothing is left that could still
-    write when the next run begins; elsewhere, and if the run was gone already, a thread looks every `PARENT_CHECK`.
-    """
-    let_worker_die()
-    for number in ENDING:
-        signal.signal(number, signal.SIG_IGN)
-    if sys.platform.startswith("linux"):
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(PARENT_CHECK)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True, name="watch parent").start()
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result | WorkerDiedError]:
+        return self._threads.submit(in_process, self._processes, self._limits, work, task)
 
 
 CONNECT_TIMEOUT = 10.0
@@ -188,9 +155,8 @@ class _Cluster(Pool):
     They have to see the same files under the same paths, and have the same version of this package.
     """
 
-    tries_alone = 1  # the scheduler has had a task on several workers before it gives it up, and a try costs some more
-
-    def __init__(self, address: str) -> None:
+    def __init__(self, limits: JobLimits, address: str) -> None:
+        super().__init__(limits)
         try:
             import distributed
         except ImportError as error:
@@ -213,24 +179,24 @@ class _Cluster(Pool):
         # of the workers that there are now; they may come and go
         return TASKS_AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
-    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
-        self.recover()
-        return self._executor.submit(work, task)
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result | WorkerDiedError]:
+        self._require_scheduler()
+        return self._executor.submit(in_process, None, self._limits, work, task)
 
-    def recover(self) -> None:
+    def _require_scheduler(self) -> None:
         if self._client.status != "running":  # else the scheduler sees to it
             raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
 
     def lost(self, error: BaseException) -> bool:
         from distributed import KilledWorker, cfexecutor
 
-        self.recover()
+        self._require_scheduler()
         # dask's executor itself fails where a result comes at the very moment in which its worker dies
         innermost = [call.filename for call in traceback.extract_tb(error.__traceback__)[-1:]]
         return isinstance(error, KilledWorker | CancelledError) or innermost == [cfexecutor.__file__]
 
     def check(self) -> None:
-        self.recover()
+        self._require_scheduler()
         if self._client.nthreads():
             self._had_workers = time.monotonic()
         elif time.monotonic() - self._had_workers > WORKERLESS:
@@ -258,20 +224,17 @@ def installed_version() -> str:
     return __version__
 
 
-def open_pool(workers: int, cluster: str | None) -> Pool:
+def open_pool(workers: int, cluster: str | None, limits: JobLimits) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
     Raises `ClusterError`: the cluster can't be reached; `ValueError`: fewer than none.
     """
     if cluster is not None:
-        return _Cluster(cluster)
-    if workers == -1:
-        import joblib
-
-        workers = joblib.cpu_count()
+        return _Cluster(limits, cluster)
+    workers = cores() if workers == -1 else workers
     if workers < 0:
         raise ValueError(f"{workers} workers; at least 0 (this process), or -1 for one per core")
-    return Pool() if workers == 0 else _LocalProcesses(workers)
+    return Pool(limits) if workers == 0 else _LocalProcesses(limits, workers)
 
 
 def run_tasks(
@@ -279,44 +242,33 @@ def run_tasks(
 ) -> Iterator[tuple[Task, Result | WorkerDiedError]]:
     """Results as they come, in any order.
 
-    When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
-    the culprit and gives a `WorkerDiedError`; the rest is fine.
+    What is lost with the machine that it ran on is handed out again, `TRIES` times at most.
 
     Raises `ClusterError`: the cluster is gone; `Interrupted`: a signal has come (`deferring_signals`), and results of
     what was at work have come as well; whatever `work` raises.
     """
     waiting = iter(tasks)
-    running: dict[Future[Result], Task] = {}
-    suspects: list[Task] = []
+    running: dict[Future[Result | WorkerDiedError], tuple[Task, int]] = {}
     while True:
         if (number := pending_signal()) is not None:
             yield from _finished(running)
             raise Interrupted(number)
-        if not suspects:
-            for task in islice(waiting, max(pool.capacity() - len(running), 0)):
-                try:
-                    running[pool.submit(work, task)] = task
-                except BrokenExecutor:
-                    suspects.append(task)
-                    break
+        for task in islice(waiting, max(pool.capacity() - len(running), 0)):
+            running[pool.submit(work, task)] = task, 1
         if not running:
-            if not suspects:
-                return
-            pool.recover()
-            while suspects:
-                task = suspects.pop(0)
-                yield task, _alone(pool, work, task)
-            continue
+            return
         for future in _wait_for_any(pool, running):
-            task = running.pop(future)
+            task, tried = running.pop(future)
             try:
                 result = future.result()
             except (Exception, CancelledError) as error:
                 if not pool.lost(error):
                     raise
-                suspects.append(task)
-            else:
-                yield task, result
+                if tried < TRIES:
+                    running[pool.submit(work, task)] = task, tried + 1
+                    continue
+                result = _died()
+            yield task, result
 
 
 def _wait_for_any(pool: Pool, running: Collection[Future[Result]]) -> Collection[Future[Result]]:
@@ -331,27 +283,8 @@ def _wait_for_any(pool: Pool, running: Collection[Future[Result]]) -> Collection
     return ()
 
 
-def _finished(running: Mapping[Future[Result], Task]) -> Iterator[tuple[Task, Result]]:
+def _finished(running: Mapping[Future[Result], tuple[Task, int]]) -> Iterator[tuple[Task, Result]]:
     """Results of what was handed out, as far as it ends well within `FINISH_TIME`; workers may hold it already."""
     for future in wait(running, FINISH_TIME, ALL_COMPLETED).done:
         if not future.cancelled() and future.exception() is None:
-            yield running[future], future.result()
-
-
-def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | WorkerDiedError:
-    deaths = 1
-    for _ in range(pool.tries_alone):
-        begin = time.monotonic()
-        try:
-            future = pool.submit(work, task)
-            if not _wait_for_any(pool, [future]):
-                raise Interrupted(pending_signal() or signal.SIGINT)
-            return future.result()
-        except (Exception, CancelledError) as error:
-            if not pool.lost(error):
-                raise
-            pool.recover()
-        deaths += 1
-        if time.monotonic() - begin > LONG_TRY:
-            break
-    return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
+            yield running[future][0], future.result()
