@@ -1,15 +1,22 @@
-"""Draw the map of CONTRIBUTING from the imports: a part per box, data flows down, imports point up (`make map`)."""
+"""Draw the map of CONTRIBUTING from the imports: a part per box, all imports point down (`make map`)."""
 
 from __future__ import annotations
 
 import sys
+import tomllib
 from collections import defaultdict
 from html import escape
 from pathlib import Path
 
-from tests.test_layers import PACKAGE, RANKS, imports_of
+import grimp
+
+ROOT = Path(__file__).resolve().parents[2]
+RULES = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+LAYERS = [layer.split(" | ") for layer in RULES[0]["layers"]]
+RANKS = {name: k for k, layer in enumerate(LAYERS) for name in layer}
 
 TEXT = {
+    "extras": "recordings, loop, live, detect, dossier",
     "base": "errors, limits, arrays, rows",
     "world": "plays a scenario",
     "drivers": "know how people drive",
@@ -17,17 +24,19 @@ TEXT = {
     "workflows": "a room for every verb",
     "cli": "names the verbs",
 }
-WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 190, 44, 24, 40, 16  # [px]
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 270, 44, 24, 40, 16  # [px]
 FONT = "font-family='sans-serif'"
 
 
 def parts() -> dict[str, set[str]]:
     """Every folder of the package, and the folders that it imports."""
-    folders = [path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists() and path.name in TEXT]
-    return {
-        name: {found for path in (PACKAGE / name).rglob("*.py") for found in imports_of(path)} & set(folders) - {name}
-        for name in folders
-    }
+    graph = grimp.build_graph("xosc_lateral", exclude_type_checking_imports=True, cache_dir=None)
+    found = {name: set[str]() for name in TEXT}
+    for name, wanted in found.items():
+        inside = {f"xosc_lateral.{name}", *graph.find_descendants(f"xosc_lateral.{name}")}
+        met = {one for module in inside for one in graph.find_modules_directly_imported_by(module)}
+        wanted |= {one.split(".")[1] for one in met if "." in one} & TEXT.keys() - {name}
+    return found
 
 
 def shown_edges(graph: dict[str, set[str]]) -> list[tuple[str, str]]:
@@ -66,7 +75,7 @@ def drawing(graph: dict[str, set[str]]) -> str:
     for name, near in shown_edges(graph):
         (x1, y1), (x2, y2) = corner[name], corner[near]
         lines.append(
-            f"<line x1='{x1 + WIDTH / 2:g}' y1='{y1:g}' x2='{x2 + WIDTH / 2:g}' y2='{y2 + HEIGHT:g}' "
+            f"<line x1='{x1 + WIDTH / 2:g}' y1='{y1 + HEIGHT:g}' x2='{x2 + WIDTH / 2:g}' y2='{y2:g}' "
             "stroke='#68708a' stroke-width='1.2' marker-end='url(#tip)'/>"
         )
     for name, (x, y) in sorted(corner.items()):
