@@ -19,10 +19,10 @@ from laboratory.markers import show
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import sample_context
 from xosc_lateral.extras.recordings.importers import dlr_ht
+from xosc_lateral.extras.recordings.reference_line import fit_reference_line
 from xosc_lateral.files.drives import drives_of_table
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.driver_context import NEIGHBOURS
-from xosc_lateral.world.road.reference_line import fit_reference_line
 from xosc_lateral.world.surroundings.give_way import wider
 
 FloatArray = NDArray[np.float64]

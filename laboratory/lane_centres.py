@@ -15,7 +15,7 @@ from laboratory.markers import show
 from xosc_lateral.extras.recordings import lanes_from_tracks
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.importers import dlr_ht
-from xosc_lateral.world.road.reference_line import fit_reference_line
+from xosc_lateral.extras.recordings.reference_line import fit_reference_line
 
 FloatArray = NDArray[np.float64]
 SPACINGS = (25.0, 50.0, 100.0, 150.0, 250.0, 400.0)  # [m]

@@ -14,7 +14,7 @@ from xosc_lateral import XoscLateralError, import_drives, read_drives, reconstru
 from xosc_lateral.drivers.drives.identity import clock_runs, frozen, identify, leaps
 from xosc_lateral.extras.detect.sources import SourceSettings, sources_of
 from xosc_lateral.extras.recordings.recordings import read_recordings
-from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad
+from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad
 from xosc_lateral.workflows.result import given_drives
 
 COUNT = 600

@@ -22,7 +22,7 @@ from tests.extras.recordings.test_importers_tracks import (
 from tests.kit.jam import LENGTH, RADIUS, ROAD, jam
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.cli import main
-from xosc_lateral.files.opendrive.write import WrittenLane, WrittenRoad
+from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad
 
 XSD = Path(__file__).resolve().parents[2] / "data/xsd/OpenSCENARIO-1.2.0.xsd"
 

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import CutRules, Drive
-from xosc_lateral.drivers.drives.gridding import grid_drives
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.effects.response import respond
+from xosc_lateral.extras.loop.gridding import grid_drives
 
 # Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5

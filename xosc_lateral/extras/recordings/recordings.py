@@ -19,11 +19,11 @@ from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_n
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
+from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
 from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
-from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag

@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.files.opendrive.write import Connections, WrittenLane, WrittenRoad, curved_plan, roads_xml
-from xosc_lateral.world.road.reference_line import ReferenceLine
+from xosc_lateral.extras.recordings.reference_line import ReferenceLine
+from xosc_lateral.extras.recordings.road_file import Connections, WrittenLane, WrittenRoad, curved_plan, roads_xml
 
 PIECE_LENGTH = 5.0  # of a curved reference line: a cubic is off by 2 mm on a radius of 10 m, see `curved_plan` [m]
 SAMPLE_LENGTH = 0.5  # between points that widths are measured at: a chord is off by 3 mm on a radius of 10 m [m]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.drivers.drives.gridding import circular_period
+from xosc_lateral.extras.loop.gridding import circular_period
 
 
 def turning(n: int = 4000, seed: int = 0) -> np.ndarray:

@@ -12,9 +12,9 @@ import numpy as np
 from lxml import etree
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.extras.recordings.reference_line import ReferenceLine
 from xosc_lateral.files.openscenario.write.build import decimal, sub
 from xosc_lateral.files.output_paths import template_mark
-from xosc_lateral.world.road.reference_line import ReferenceLine
 
 PIECE_LENGTH = 50.0
 """Of a curved reference line: a cubic through both ends with their directions is off by less than a millimetre on a

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.extras.recordings.reference_line import fit_reference_line
 from xosc_lateral.world.road.geometry import simplify
-from xosc_lateral.world.road.reference_line import fit_reference_line
 
 RADIUS = 4000.0
 """[m]"""

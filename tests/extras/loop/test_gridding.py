@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.fft import next_fast_len
 
 from xosc_lateral.drivers.drives.drive import CutRules, Drive
-from xosc_lateral.drivers.drives.gridding import circular_columns, grid_drives
 from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.extras.loop.gridding import circular_columns, grid_drives
 
 PAD, MULTIPLE = 75, 5
 RULES = CutRules()
