@@ -5,7 +5,7 @@ VERBS = {
         "xosc_lateral.extras.dossier.verb",
         "Evidence for an assessor.",
         "template",
-        "docs/how_to/in_your_pipeline.md",
+        "docs/how_to/dossier.md",
     ),
 }
 CALLS = {
