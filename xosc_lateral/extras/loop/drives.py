@@ -34,7 +34,6 @@ ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 LEAST_SHARE = 0.1  # Of the usual information of a drive below which its own slope says nothing. [-]
 OWN_LEVEL = 0.01  # p-value up to which drives are said to differ. [-]
 SURE = 2.0  # Standard errors by which an effect is there in a drive. [-]
-DEGREES = 60.0  # Of freedom with which the variance that slopes have by chance is known. [-]
 POWER_Z = 0.84  # Standard normal quantile of a power of 80 %.
 BOUND_Z = 1.645  # Of a one-sided bound of 95 %.
 
@@ -139,18 +138,13 @@ def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled
 
 @dataclass(frozen=True, slots=True)
 class OwnSlopes:
-    """Whether an effect differs from drive to drive: slopes over the common one, shape (drives,)."""
+    """Whether an effect differs from drive to drive: each drive's slope over the common one."""
 
-    relative: FloatArray  # 1: as the effect is; 0: it does not act there; NaN: the drive says nothing.
-    error: FloatArray
     p_value: float  # That slopes scatter as much though all are alike. [-]
     scatter: float  # Standard deviation between drives. [-]
     there: tuple[str, ...]  # Drives in which it surely acts, by name.
-
-    @property
-    def relative_there(self) -> float:
-        """Mean slope of those. [-]"""
-        return float(np.mean(self.relative[self.relative > SURE * self.error]))
+    size_there: float  # Mean slope of those, each as likely as its own and all drives' say [2]_, with its error. [-]
+    error_there: float
 
     @property
     def differ(self) -> bool:
@@ -159,22 +153,34 @@ class OwnSlopes:
 
 
 def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes | None:
-    """Slopes of white rows, levels taken out, on the white path of an effect, shape (n,) each; None: too few drives."""
+    """Slopes of white rows, levels taken out, on the white path of an effect, shape (n,) each; None: too few drives.
+
+    What slopes scatter by though all are alike is what their minutes show (a clustered error; Liang, Zeger 1986), as
+    many as would tell as much if all moved the driver alike.
+    """
     from scipy.stats import f
 
     power = np.bincount(coarse.drive, path**2, minlength=coarse.drives)
     lasting = (counted(coarse) > 0.0) & (power > LEAST_SHARE * power.sum() / coarse.drives)
-    if (number := int(lasting.sum())) < FEWEST:
+    number, inside = int(lasting.sum()), lasting[coarse.drive] & coarse.valid
+    moved = np.bincount(coarse.cluster, path**2 * inside)
+    minutes = float(moved.sum() ** 2 / max(float(moved @ moved), 1e-300))
+    if number < FEWEST or minutes <= number:
         return None
     slopes = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
+    left = np.bincount(coarse.cluster, path * (rows - slopes[coarse.drive] * path) * inside)
     weight = np.where(lasting, power, 0.0)
+    variance = float(left @ left) / float(weight.sum()) * minutes / (minutes - number)
     mean = float(weight @ slopes / weight.sum())
-    scatter = float(weight @ np.square(slopes - mean)) / MEAN_INFLATION
-    p_value = max(float(f.sf(scatter / (number - 1), number - 1, DEGREES)), MINIMUM_P)
-    noise = np.where(lasting, MEAN_INFLATION / np.maximum(power, 1e-300), np.inf)
-    between = 1.0 / weights_between(slopes, noise, np.ones((len(slopes), 1)))[lasting] - noise[lasting]
-    relative = np.where(lasting, slopes / mean if mean else np.nan, np.nan)
-    error = np.where(lasting, np.sqrt(noise) / max(abs(mean), 1e-300), np.nan)
-    there = tuple(name for name, sure in zip(coarse.timeline.names, relative > SURE * error, strict=True) if sure)
-    spread = float(np.sqrt(max(between.mean(), 0.0))) / max(abs(mean), 1e-300)
-    return OwnSlopes(relative, error, p_value, spread, there)
+    scatter = float(weight @ np.square(slopes - mean)) / max(variance, 1e-300)
+    p_value = max(float(f.sf(scatter / (number - 1), number - 1, minutes - number)), MINIMUM_P)
+    noise = np.where(lasting, variance / np.maximum(power, 1e-300), np.inf)
+    between = float((1.0 / weights_between(slopes, noise, np.ones((len(slopes), 1))) - noise)[lasting].mean())
+    there = lasting & (np.sign(mean) * slopes > SURE * np.sqrt(noise))
+    known = max(between, 0.0) / np.maximum(max(between, 0.0) + noise[there], 1e-300)  # share that a drive knows itself
+    size, scale = float(np.mean(mean + known * (slopes[there] - mean))) if there.any() else mean, max(abs(mean), 1e-300)
+    error = float(np.sqrt(np.sum(known * noise[there]))) / max(int(there.sum()), 1)
+    names = tuple(name for name, sure in zip(coarse.timeline.names, there, strict=True) if sure)
+    return OwnSlopes(
+        p_value, float(np.sqrt(max(between, 0.0))) / scale, names, size / mean if mean else 0.0, error / scale
+    )

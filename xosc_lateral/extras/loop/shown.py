@@ -17,7 +17,6 @@ from xosc_lateral.extras.loop.candidates import Family
 from xosc_lateral.extras.loop.column_search import ColumnSearch, SearchedTerm
 from xosc_lateral.extras.loop.dictionary import TIMINGS, Search, beside
 from xosc_lateral.extras.loop.drives import BOUND_Z, FEWEST, FEWEST_BETWEEN, POWER_Z, Pooled, counted
-from xosc_lateral.extras.loop.ends import DRIVING_QUANTILES
 from xosc_lateral.extras.loop.model import CLIP, Fitted
 from xosc_lateral.extras.loop.terms import spread
 from xosc_lateral.extras.loop.terms.between import (
@@ -27,7 +26,7 @@ from xosc_lateral.extras.loop.terms.between import (
     can_be_told,
     whole_drive_columns,
 )
-from xosc_lateral.extras.loop.terms.column import of_kind
+from xosc_lateral.extras.loop.terms.column import DRIVING_QUANTILES, of_kind
 from xosc_lateral.extras.loop.terms.mean import MeanTerm
 from xosc_lateral.extras.loop.terms.time import StepTerm, mean_alike, spread_alike
 
@@ -54,9 +53,9 @@ class Shown:
     more_minutes: float | None = None  # Of such driving until 0.1 m, or a factor of 1.5, is found as often.
 
 
-def what_drives_show(search: Search, fitted: Fitted, untested: dict[str, str], *, plan: bool = False) -> list[Shown]:
-    """Every look; `untested` columns with the reason. Before effects are sought (`plan`) there are no bounds."""
-    shown = [Shown(name, "mean and spread", False, why) for name, why in sorted(untested.items())]
+def what_drives_show(search: Search, fitted: Fitted, *, plan: bool = False) -> list[Shown]:
+    """Every look that may find a cause. Before effects are sought (`plan`) there are no bounds."""
+    shown: list[Shown] = []
     for kind in (MeanTerm, spread.SpreadTerm):
         shown += _of_columns(search, fitted, kind)
     shown += [*_of_whole_drives(search, fitted), *_of_time(search, fitted)]
