@@ -126,7 +126,7 @@ def test_of_four_drives_nothing_between_them_can_be_told() -> None:
     search, fitted = search_of(coarse, "passengers"), fit_model(coarse, ())
     assert BetweenTerm.test(search, fitted) is None
     assert BetweenSpreadTerm.test(search, fitted) is None
-    told = [one for one in what_drives_show(search, fitted, {}) if one.what.startswith("passengers")]
+    told = [one for one in what_drives_show(search, fitted) if one.what.startswith("passengers")]
     assert [one.tested for one in told] == [False, False]
     assert all("cannot be told" in one.why and "4 drives" in one.why for one in told)
 
@@ -144,7 +144,7 @@ def test_the_regression_over_drives_is_honest_with_five_of_them() -> None:
 
 def shown(coarse: Coarse, fitted: Fitted | None = None, *, plan: bool = False) -> dict[tuple[str, str], Shown]:
     search = search_of(coarse, "x")
-    looks = what_drives_show(search, fitted or fit_model(coarse, ()), {"clock": "why"}, plan=plan)
+    looks = what_drives_show(search, fitted or fit_model(coarse, ()), plan=plan)
     return {(one.what, one.acts): one for one in looks}
 
 

@@ -169,18 +169,16 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
         return None
     slopes = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
     left = np.bincount(coarse.cluster, path * (rows - slopes[coarse.drive] * path) * inside)
-    weight = np.where(lasting, power, 0.0)
-    variance = float(left @ left) / float(weight.sum()) * minutes / (minutes - number)
-    mean = float(weight @ slopes / weight.sum())
-    scatter = float(weight @ np.square(slopes - mean)) / max(variance, 1e-300)
+    weight, slopes = power[lasting], slopes[lasting]
+    variance = max(float(left @ left) / float(weight.sum()) * minutes / (minutes - number), 1e-300)
+    mean, noise = float(weight @ slopes / weight.sum()), variance / weight
+    scatter = float(weight @ np.square(slopes - mean)) / variance
     p_value = max(float(f.sf(scatter / (number - 1), number - 1, minutes - number)), MINIMUM_P)
-    noise = np.where(lasting, variance / np.maximum(power, 1e-300), np.inf)
-    between = float((1.0 / weights_between(slopes, noise, np.ones((len(slopes), 1))) - noise)[lasting].mean())
-    there = lasting & (np.sign(mean) * slopes > SURE * np.sqrt(noise))
-    known = max(between, 0.0) / np.maximum(max(between, 0.0) + noise[there], 1e-300)  # share that a drive knows itself
-    size, scale = float(np.mean(mean + known * (slopes[there] - mean))) if there.any() else mean, max(abs(mean), 1e-300)
-    error = float(np.sqrt(np.sum(known * noise[there]))) / max(int(there.sum()), 1)
-    names = tuple(name for name, sure in zip(coarse.timeline.names, there, strict=True) if sure)
-    return OwnSlopes(
-        p_value, float(np.sqrt(max(between, 0.0))) / scale, names, size / mean if mean else 0.0, error / scale
-    )
+    between = max(float((1.0 / weights_between(slopes, noise, np.ones((number, 1))) - noise).mean()), 0.0)
+    sure = np.sign(mean) * slopes > SURE * np.sqrt(noise)
+    known = between / np.maximum(between + noise, 1e-300)  # share of its slope that a drive knows itself
+    likely, scale = mean + known * (slopes - mean), max(abs(mean), 1e-300)
+    size = float(likely[sure].mean()) if sure.any() else mean
+    error = float(np.sqrt(np.sum((known * noise)[sure]))) / max(int(sure.sum()), 1)
+    names = tuple(np.array(coarse.timeline.names)[lasting][sure].tolist())
+    return OwnSlopes(p_value, float(np.sqrt(between)) / scale, names, size / mean if mean else 0.0, error / scale)

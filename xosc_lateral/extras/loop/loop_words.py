@@ -104,9 +104,9 @@ def product_label(effect: Product) -> str:
 # ---- one finding ----
 def finding_sentence(finding: Finding) -> str:
     """One finding in a line: what, how much, between which ends, when, of what shape, and what else it may be."""
-    when = "" if finding.lag_s is None else timing_words(finding.lag_s, finding.response_s or 0.0)
+    when = "" if finding.lag_s is None else f"; {timing_words(finding.lag_s, finding.response_s or 0.0)}"
     alike = f"; {others_words(finding)} would explain it about as well" if finding.alike else ""
-    return f"{finding.effect}: {size_words(finding)}{when} ({finding.shape}){alike}"
+    return f"{finding.effect}: {size_words(finding)}{when}; {finding.shape}{alike}"
 
 
 def size_words(finding: Finding) -> str:
@@ -123,8 +123,9 @@ def size_words(finding: Finding) -> str:
     own = finding.own_slopes
     if own is None:
         return words
-    where = f" in {', '.join(own.there)}, less, nothing or the reverse in the others" if own.there else ""
-    return f"{words}{where} (drives differ, p = {own.p_value:.1e})"
+    where = f" in {', '.join(own.there)}" if own.there else ""
+    others = ", in the others less, nothing or the reverse" if own.there else ""
+    return f"{words}{where} (drives differ, p = {own.p_value:.1e}{others})"
 
 
 def _passage_words(passage: Passage, column: str) -> str:

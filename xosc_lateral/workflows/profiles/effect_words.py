@@ -80,18 +80,21 @@ def _value(value: float) -> str:
 
 def timing_words(lag_s: float, response_s: float) -> str:
     """When a driver begins to respond, and how fast he does."""
-    lag = f", {abs(lag_s):.1f} s {'ahead' if lag_s < 0 else 'later'}" if abs(lag_s) >= 0.1 else ", at once"
-    return f"{lag}, response time {response_s:.1f} s"
+    begins = f"{abs(lag_s):.1f} s {'ahead' if lag_s < 0 else 'later'}" if abs(lag_s) >= 0.1 else "at once"
+    return f"begins {begins}, response time {response_s:.1f} s"
 
 
 def effect_line(effect: Effect) -> str:
     """An effect in a line: what it changes, by how much and between which ends; a hidden one by its parameters."""
     if isinstance(effect, ColumnEffect):
         ends = None if effect.course else ends_of(effect)
-        size = "" if ends is None else f": {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
-        beside = "" if ends is None else elsewhere_words(effect.acts, ends)
-        timing = ", a course over time" if effect.course else timing_words(effect.lag_s, effect.response_time)
-        return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{timing}){size}{beside}"
+        size = ""
+        if ends is not None:
+            size = f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
+            size += f"{elsewhere_words(effect.acts, ends)};"
+            size += f" drivers differ by {ends.scatter / abs(ends.change):.0%} of it;" if ends.scatter else ""
+        timing = "a course over time" if effect.course else timing_words(effect.lag_s, effect.response_time)
+        return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)}:{size} {timing}; {effect.shape}"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
     kind = str(plain.pop("kind")).replace("-", " ")
     return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())

@@ -139,7 +139,7 @@ def test_changes_are_proportional_to_the_coefficient(factor: float) -> None:
 
 def test_an_effect_that_does_not_know_its_ends_has_no_size() -> None:
     assert ends_of(EFFECTS["linear"]) is None
-    assert effect_line(EFFECTS["linear"]) == "mean offset by x (linear, 1.2 s ahead, response time 2.0 s)"
+    assert effect_line(EFFECTS["linear"]) == "mean offset by x: begins 1.2 s ahead, response time 2.0 s; linear"
 
 
 @pytest.mark.parametrize("driven", [((),), ((1.0,), (2.0,)), ((float("nan"),),), (tuple(map(float, range(33))),)])

@@ -23,6 +23,7 @@ class Ends:
     error: float  # Standard error of it. [m] or natural logarithm
     elsewhere: float = 0.0  # The same change with the second column at its other end. [m] or natural logarithm
     other: Mapping[str, float] | None = None  # That end.
+    scatter: float = 0.0  # Standard deviation of the change between drivers. [m] or natural logarithm
 
 
 def ends_of(effect: ColumnEffect) -> Ends | None:
@@ -52,6 +53,7 @@ def ends_of(effect: ColumnEffect) -> Ends | None:
         float(np.linalg.norm(contrast * np.asarray(effect.errors))),
         float(table[high, other] - table[low, other]) if size > 1 else 0.0,
         held(high, other) if size > 1 else None,
+        float(np.linalg.norm(contrast * np.asarray(effect.between_drivers))) if effect.between_drivers else 0.0,
     )
 
 
