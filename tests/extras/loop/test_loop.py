@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from examples.driver_simulator.plants import ShiftBy, SimulatedResponse
 from examples.driver_simulator.simulator import simulate_drive
@@ -31,6 +32,7 @@ from xosc_lateral.drivers.model.effects import (
     Threshold,
     TimeSmooth,
 )
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop.close import Finding, LoopResult, close_loop
 from xosc_lateral.extras.loop.loop_curves import curve_of, moving_spread
 from xosc_lateral.extras.loop.loop_figures import (
@@ -114,7 +116,7 @@ def hidden(result: LoopResult, effect: Effect | None, kind: str, statistic: str 
 def test_the_page_says_in_words_what_was_found_how_sure_and_when(page: str, result: LoopResult) -> None:
     finding = result.findings[0]
     assert finding.columns == ("grade",)
-    assert f"mean offset by grade ({size_words(finding)})" in page
+    assert f"mean offset by grade ({size_words(finding).partition(' as ')[0]}" in page
     assert "further left" in page
     assert "is found practically never (p = " in page
     assert re.search(r"begins (at once|[\d.]+ s (ahead|later)), response time [\d.]+ s", page)
@@ -228,7 +230,10 @@ def test_every_hidden_kind_is_told_in_plain_words(result: LoopResult, kind: str)
 
 @pytest.mark.parametrize("effect", SHAPES, ids=lambda effect: f"{effect.kind}-{effect.acts.value}")
 def test_every_shape_is_told_and_drawn(result: LoopResult, effect: ColumnEffect) -> None:
-    finding = replace(result.findings[0], effects=(effect,), columns=effect.columns)
+    sized = structs.replace(effect, driven=((0.0, 1.0),) * len(effect.columns))
+    kind = "location" if effect.acts is Acts.LOCATION else "scale"
+    told = {"ends": ends_of(sized), "kind": kind, "size_m": 1.2, "effects": (effect,), "columns": effect.columns}
+    finding = replace(result.findings[0], **told)
     words = meaning(finding)
     assert all(column in words for column in effect.columns)
     curve = curve_of(result, effect)
