@@ -180,7 +180,7 @@ def test_there_is_one_verdict_and_it_is_that_of_what_is_left(result: LoopResult,
     assert ("no more than chance" in sentence) == (p_value > 0.05)
     assert ("More is left than chance: `rain`" in sentence) == (p_value <= 0.05)
     assert "What is not recorded cannot be named: a cause that comes and goes with `grade` looks the same." in sentence
-    assert "four of five would be found" in sentence
+    assert "Four of five changes of the mean by" in sentence
     assert loop_record(told, [table])["unexplained"]["sentence"] == sentence
     assert loop_text(told).endswith(sentence)
     assert "explainable" not in loop_text(told)

@@ -111,12 +111,12 @@ def finding_sentence(finding: Finding) -> str:
 
 def size_words(finding: Finding) -> str:
     """What is different, with two standard errors, and between which ends it is."""
-    if finding.passage is not None and finding.over_time:
-        return _passage_words(finding.passage, finding.columns[0])
     effect, ends = finding.effects[0] if finding.effects else None, finding.ends
     if ends is None or not isinstance(effect, ColumnEffect):
         about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
         return KINDS[finding.kind][0].format(finding.size_m, about)
+    if finding.passage is not None and finding.over_time:
+        return _passage_words(finding.passage, finding.columns[0])
     on_mean = effect.acts is Acts.LOCATION
     change, error = (finding.size_m, finding.size_error) if on_mean else (np.log(finding.size_m), finding.log_error)
     words = f"{change_words(effect.acts, float(change), error)} {where_words(ends)}{elsewhere_words(effect.acts, ends)}"
@@ -316,4 +316,5 @@ def shown_words(shown: Sequence[Shown]) -> str:
         words += [form.format(sizes[len(sizes) // 2])] if sizes else []
     if not words:
         return "In these drives no effect of a column would be found."
-    return f"Of changes {' and '.join(words)}, four of five would be found (median over columns; each in the report)."
+    changes = " or ".join(words)
+    return f"Four of five changes {changes} would be found in these drives (median over columns; each in the report)."
