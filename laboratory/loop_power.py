@@ -9,6 +9,7 @@ find it searches. Shares within 70 to 90 % keep the margin; half the size has to
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
@@ -113,7 +114,7 @@ def main() -> None:
     parser.add_argument("tables", nargs="?", type=int, default=40)
     number = parser.parse_args().tables
     hits, tried = Counter[str](), Counter[str]()
-    for bare, other, columns, rng in tables(number):
+    for count, (bare, other, columns, rng) in enumerate(tables(number), start=1):
         _, search = search_of(bare, np.random.SeedSequence(1), ["lane_width"], dict.fromkeys(columns, "road"))
         looks = {(one.what, one.acts): one.smallest for one in what_drives_show(search, fit_model(bare, ()))}
         for share in (1.0, 0.5):
@@ -127,6 +128,13 @@ def main() -> None:
                     label = f"{share:g} of the size: {name}, {kind.group}{', one of three' * (len(acting) > 1)}"
                     tried[label] += 1
                     hits[label] += name in named
+        whole, half = (sum(hits[one] for one in tried if one.startswith(share)) for share in ("1 ", "0.5 "))
+        planted_each = sum(times for one, times in tried.items() if one.startswith("1 "))
+        print(
+            f"table {count}: of {planted_each} at the size {whole} found, at half of it {half}",
+            file=sys.stderr,
+            flush=True,
+        )
     print(f"SIZE_MARGIN {SIZE_MARGIN}, {number} tables")
     for label, times in tried.items():
         print(f"{label:50s} {hits[label]:3d} of {times:3d} = {hits[label] / times:.0%}")

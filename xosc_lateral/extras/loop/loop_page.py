@@ -28,7 +28,8 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
     page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(loop_words.outcome(result))
-    page.key_figures([KeyFigure(words, what) for what, words in loop_words.error_words(result)])
+    figures = [KeyFigure(f"{one:.1f} → {two:.1f} mm", what) for what, one, two in loop_words.errors_of(result)]
+    page.key_figures([*figures, KeyFigure(f"{1e3 * result.floor:.1f} mm", "between halves of these drives")])
     page.lead(loop_words.verdict(result))
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
@@ -82,9 +83,9 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
 
 HOW_TO_READ = (
     "Offset: distance of the rear axle from the lane centre, positive to the left of travel.",
-    "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
-    "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
-    "simulated runs of the profile under the same context.",
+    "Error (before → after): the root mean square of measured minus expected over all groups of statistics, on blocks "
+    "that were used neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of "
+    "{n_runs} simulated runs of the profile under the same context.",
     "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, "
     "no mean, spread or frequency band distinguishes the profile from the driver.",
     "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
@@ -115,21 +116,6 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
                 "bands: two standard errors. Held-out blocks: means by fifths of the effect.",
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
-    page.heading("All effects in numbers")
-    timed = any(finding.lag_s is not None for finding in result.findings)
-    page.table(
-        [
-            {"effect": finding.effect, "shape": finding.shape, "size": loop_words.size_words(finding)}
-            | ({"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {})
-            | {"p-value": finding.p_value}
-            | {"error before [mm]": 1000.0 * finding.error_before, "error after [mm]": 1000.0 * finding.error_after}
-            for finding in result.findings
-        ],
-        "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
-        "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
-        formats={"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"}
-        | dict.fromkeys(("error before [mm]", "error after [mm]"), ".1f"),
-    )
     if proofs:
         caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
         page.table([{"in a scenario": one} for one in proofs], caption)

@@ -203,21 +203,16 @@ def loop_text(result: LoopResult) -> str:
     for item in result.identified.usable.feedback:
         may = "may follow" if item.doubtful else "follows"
         lines.append(f"{item.column}: {may} from the car's own movement, so it is not taken for a cause")
-    lines += [f"{what}: {words}" for what, words in error_words(result)]
+    lines += [f"{what}: held-out error {one:.1f} mm before, {two:.1f} mm after" for what, one, two in errors_of(result)]
+    lines[-1] += f" ({1e3 * result.floor:.1f} mm between random halves of these drives and the whole)"
     return "\n".join([*lines, verdict(result)])
 
 
-def error_words(result: LoopResult) -> list[tuple[str, str]]:
-    """Errors before and after, where the effects act and over everything."""
-    over_all, floor = (result.error_before, result.error_after), f"{1e3 * result.floor:.1f} mm"
-    pairs = {"error on held-out blocks": over_all}
-    if result.own_errors is not None:
-        pairs = {"error on held-out blocks, where the effects act": result.own_errors, "over everything": over_all}
-    words = [
-        (what, f"{1e3 * before:.1f} mm before, {1e3 * after:.1f} mm after") for what, (before, after) in pairs.items()
-    ]
-    what, ends = words.pop()
-    return [*words, (what, f"{ends} ({floor} between random halves of these drives and the whole)")]
+def errors_of(result: LoopResult) -> list[tuple[str, float, float]]:
+    """Held-out errors before and after, where the effects act and over everything, in words and mm."""
+    own = result.own_errors
+    pairs = {"where the effects act": own, "over everything": (result.error_before, result.error_after)}
+    return [(what, 1e3 * pair[0], 1e3 * pair[1]) for what, pair in pairs.items() if pair]
 
 
 def outcome(result: LoopResult) -> str:

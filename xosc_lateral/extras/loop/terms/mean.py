@@ -87,9 +87,10 @@ class MeanTerm(SearchedTerm):
         """Change over the driving range; of one column also what the car does in a typical passage."""
         described, effect, own = super().describe(fitted, effects, key), effects[0], self.own_slopes(fitted)
         if own is not None and own.differ:
-            size = described.size_m
-            there = {"size_m": size * own.size_there, "size_error": abs(size) * own.error_there} if own.there else {}
-            described = replace(described, own_slopes=own, **there)
+            described = replace(described, own_slopes=own)
+            if own.there:
+                size, error = described.size_m * own.size_there, abs(described.size_m) * own.error_there
+                described = replace(described, size_m=size, size_error=error)
         if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
             return described
         share = described.size_error / max(abs(described.size_m), 1e-12)
