@@ -214,7 +214,7 @@ def _loudness(rows: FloatArray, rest: FloatArray, left: FloatArray) -> FloatArra
     # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
     kurtosis = float(np.mean(left**4) / np.mean(left**2) ** 2)
     sure = 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
-    return np.maximum((weights * np.square(rest)).sum(axis=1) / sure, 1.0)
+    return np.asarray(np.maximum((weights * np.square(rest)).sum(axis=1) / sure, 1.0))
 
 
 def beside_parts(
