@@ -50,11 +50,6 @@ class Finding(Description):
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
     @property
-    def log_error(self) -> float:
-        """Standard error of the logarithm of a factor. [-]"""
-        return self.size_error / max(abs(self.size_m), 1e-300)
-
-    @property
     def over_time(self) -> bool:
         """Whether it is a course over time, which one delay does not describe."""
         return self.passage is not None and self.lag_s is None

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Product
 from xosc_lateral.extras.loop.close import Finding, LoopResult
 from xosc_lateral.extras.loop.columns import FEEDBACK_BAND_HZ, FUNCTION_COHERENCE, Feedback
@@ -117,8 +118,9 @@ def size_words(finding: Finding) -> str:
         return KINDS[finding.kind][0].format(finding.size_m, about)
     if finding.passage is not None and finding.over_time:
         return _passage_words(finding.passage, finding.columns[0])
-    on_mean = effect.acts is Acts.LOCATION
-    change, error = (finding.size_m, finding.size_error) if on_mean else (np.log(finding.size_m), finding.log_error)
+    change, error = finding.size_m, finding.size_error
+    if effect.acts is not Acts.LOCATION:
+        change, error = np.log(change), error / change
     words = f"{change_words(effect.acts, float(change), error)} {where_words(ends)}{elsewhere_words(effect.acts, ends)}"
     own = finding.own_slopes
     if own is None:
@@ -296,10 +298,8 @@ def shown_text(shown: Sequence[Shown]) -> str:
     """The same for a terminal."""
     rows = shown_rows(shown)
     names = list(rows[0]) if rows else []
-    cells = [names, *([row[name] or "-" for name in names] for row in rows)]
-    widths = [max(len(cell[column]) for cell in cells) for column in range(len(names))]
-    lines = ("  ".join(text.ljust(width) for text, width in zip(cell, widths, strict=True)) for cell in cells)
-    return "\n".join([shown_words(shown), "", *(line.rstrip() for line in lines), "", SHOWN_NOTE])
+    lines = aligned([names, *([row[name] or "-" for name in names] for row in rows)])
+    return "\n".join([shown_words(shown), "", *lines, "", SHOWN_NOTE])
 
 
 def shown_words(shown: Sequence[Shown]) -> str:
