@@ -124,7 +124,9 @@ def finite(value: Any) -> Any:
 
 
 def _gain(gain: Gain | None) -> dict[str, Any] | None:
-    return gain and {"mean_nat_per_block": gain.mean, "interval": list(gain.interval), "chosen_in_folds": gain.folds}
+    if gain is None:
+        return None
+    return {"mean_nat_per_block": gain.mean, "interval": list(gain.interval), "chosen_in_folds": gain.folds}
 
 
 def _profile(profile: DriverProfile) -> dict[str, Any]:
