@@ -28,7 +28,10 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
     page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(loop_words.outcome(result))
-    figures = [KeyFigure(f"{one:.1f} → {two:.1f} mm", what) for what, one, two in loop_words.errors_of(result)]
+    figures = [
+        KeyFigure(f"{one:.1f} → {two:.1f} mm", f"held-out error {what}")
+        for what, one, two in loop_words.errors_of(result)
+    ]
     page.key_figures([*figures, KeyFigure(f"{1e3 * result.floor:.1f} mm", "between halves of these drives")])
     page.lead(loop_words.verdict(result))
     _add_findings(page, result, proofs)
