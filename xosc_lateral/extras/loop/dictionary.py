@@ -110,13 +110,13 @@ def tells_drives(values: FloatArray, coarse: Coarse) -> bool:
     if coarse.drives == 1:
         return False
     inside, drive = coarse.timeline.valid, coarse.timeline.drive
-    seen, own = np.nan_to_num(values[inside], nan=0.0, posinf=0.0, neginf=0.0), drive[inside]
-    rows = np.bincount(own, minlength=coarse.drives)
-    usual = np.bincount(own, seen, minlength=coarse.drives) / np.maximum(rows, 1)
+    seen, of_drive = np.nan_to_num(values[inside], nan=0.0, posinf=0.0, neginf=0.0), drive[inside]
+    rows = np.bincount(of_drive, minlength=coarse.drives)
+    usual = np.bincount(of_drive, seen, minlength=coarse.drives) / np.maximum(rows, 1)
     there = usual[rows > 0]
     high = int(np.sum(there > 0.5 * (there.min() + there.max())))
     few = min(high, len(there) - high) < FEWEST_A_SIDE
-    return few and float(np.mean(np.square(seen - usual[own]))) < LEFT_WITHIN * float(seen.var())
+    return few and float(np.mean(np.square(seen - usual[of_drive]))) < LEFT_WITHIN * float(seen.var())
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
@@ -223,10 +223,10 @@ def beside_parts(
     left: FloatArray,
     known: FloatArray,
     spans: Callable[[str], FloatArray],
-    own: Callable[[str], FloatArray],
+    by_drive: Callable[[str], FloatArray],
 ) -> FloatArray:
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components. None
-    that explains less than slopes of each drive's `own` would: it would stand for which drive it is."""
+    that explains less than slopes of each drive's own (`by_drive`) would: it would stand for which drive it is."""
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -246,7 +246,7 @@ def beside_parts(
         best_rows = rows[:, np.argsort(-gains)[:RESPONSE_ENTRIES]]
         unexplained = of_unit_variance(beside(orthonormal(best_rows), rest))
         gains = gains / _loudness(rows.T, unexplained, left) - dictionary.costs[entries]
-        slopes = [orthonormal(beside(span, own(column)), CROSS_BASIS) for column in pair]
+        slopes = [orthonormal(beside(span, by_drive(column)), CROSS_BASIS) for column in pair]
         rivals = [as_one_degree(float(np.sum(np.square(rest @ one))), one.shape[1]) for one in slopes if one.shape[1]]
         usable = (power > LEFT_OVER) & (gains > max(map(float, rivals), default=-np.inf))
         scores[entries] = np.where(usable, np.minimum(scores[entries], gains), -np.inf)

@@ -33,7 +33,7 @@ MEAN_INFLATION, SPREAD_INFLATION, PRIOR_DRIVES = 2.1, 1.65, 4.0
 ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 LEAST_SHARE = 0.1  # Of the usual information of a drive below which its own slope says nothing. [-]
 OWN_LEVEL = 0.01  # p-value up to which drives are said to differ. [-]
-SURE = 2.0  # Standard errors by which an effect is there in a drive. [-]
+SURE_LEVEL = 0.05  # Probability that an effect is said to act in any drive in which it does not. [-]
 POWER_Z = 0.84  # Standard normal quantile of a power of 80 %.
 BOUND_Z = 1.645  # Of a one-sided bound of 95 %.
 
@@ -158,7 +158,7 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
     What slopes scatter by though all are alike is what their minutes show (a clustered error; Liang, Zeger 1986), as
     many as would tell as much if all moved the driver alike.
     """
-    from scipy.stats import f
+    from scipy.stats import f, norm
 
     power = np.bincount(coarse.drive, path**2, minlength=coarse.drives)
     lasting = (counted(coarse) > 0.0) & (power > LEAST_SHARE * power.sum() / coarse.drives)
@@ -175,7 +175,7 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
     scatter = float(weight @ np.square(slopes - mean)) / variance
     p_value = max(float(f.sf(scatter / (number - 1), number - 1, minutes - number)), MINIMUM_P)
     between = max(float((1.0 / weights_between(slopes, noise, np.ones((number, 1))) - noise).mean()), 0.0)
-    sure = np.sign(mean) * slopes > SURE * np.sqrt(noise)
+    sure = np.sign(mean) * slopes > float(norm.isf(SURE_LEVEL / number)) * np.sqrt(noise)
     known = between / np.maximum(between + noise, 1e-300)  # share of its slope that a drive knows itself
     likely, scale = mean + known * (slopes - mean), max(abs(mean), 1e-300)
     size = float(likely[sure].mean()) if sure.any() else mean

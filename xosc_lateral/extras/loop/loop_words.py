@@ -122,12 +122,12 @@ def size_words(finding: Finding) -> str:
     if effect.acts is not Acts.LOCATION:
         change, error = np.log(change), error / change
     words = f"{change_words(effect.acts, float(change), error)} {where_words(ends)}{elsewhere_words(effect.acts, ends)}"
-    own = finding.own_slopes
-    if own is None:
+    slopes = finding.own_slopes
+    if slopes is None:
         return words
-    where = f" in {', '.join(own.there)}" if own.there else ""
-    others = ", in the others less, nothing or the reverse" if own.there else ""
-    return f"{words}{where} (drives differ, p = {own.p_value:.1e}{others})"
+    where = f" in {', '.join(slopes.there)}" if slopes.there else ""
+    others = ", in the others less, nothing or the reverse" if slopes.there else ""
+    return f"{words}{where} (drives differ, p = {slopes.p_value:.1e}{others})"
 
 
 def _passage_words(passage: Passage, column: str) -> str:
@@ -212,8 +212,7 @@ def loop_text(result: LoopResult) -> str:
 
 def errors_of(result: LoopResult) -> list[tuple[str, float, float]]:
     """Held-out errors before and after, where the effects act and over everything, in words and mm."""
-    own = result.own_errors
-    pairs = {"where the effects act": own, "over everything": (result.error_before, result.error_after)}
+    pairs = {"where the effects act": result.own_errors, "over everything": (result.error_before, result.error_after)}
     return [(what, 1e3 * pair[0], 1e3 * pair[1]) for what, pair in pairs.items() if pair]
 
 
@@ -238,13 +237,13 @@ def verdict(result: LoopResult) -> str:
     left = result.remainder
     named = sorted({column for finding in result.findings for column in finding.columns})
     if left is None:
-        said = "Whether a column predicts what is left is not known: the check failed."
+        words = "Whether a column predicts what is left is not known: the check failed."
     elif not left.columns:
-        said = "The table has no other column that could explain what is left."
+        words = "The table has no other column that could explain what is left."
     else:
         delays = f"from {-DELAYS[0]:g} s ahead to {DELAYS[-1]:g} s later"
         most = f"`{' and '.join(left.columns)}`, {delays}, explains {100 * left.share:.1f}{GAP}% of what is left"
-        said = (
+        words = (
             f"What is left is no more than chance: no column predicts it, {delays} (p = {left.p_value:.2f})."
             if left.silent
             else f"More is left than chance: {most} (p = {left.p_value:.1e})."
@@ -253,7 +252,7 @@ def verdict(result: LoopResult) -> str:
         f"a cause that comes and goes with {' or '.join(f'`{one}`' for one in named)} looks the same" if named else ""
     )
     unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
-    return f"{said} {unseen} {shown_words(result.shown)}"
+    return f"{words} {unseen} {shown_words(result.shown)}"
 
 
 def group_words(name: str, result: LoopResult) -> str:

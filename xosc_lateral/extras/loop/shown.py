@@ -35,7 +35,7 @@ from xosc_lateral.extras.loop.terms.time import StepTerm, mean_alike, spread_ali
 # 59 are found, of half of it 2). [-]
 SIZE_MARGIN, BOUND_MARGIN = 1.45, 1.15
 # Effects beyond these are no driver's: a look that finds only such is none. [m], log
-LARGEST = {"mean": 1.0, "spread": LOG_LIMIT}
+LARGEST_SIZES = {"mean": 1.0, "spread": LOG_LIMIT}
 # Round sizes that minutes are stated for: a tenth of a metre, and a factor of a half more. [m], log
 AIMS = {"mean": 0.1, "spread": float(np.log(1.5))}
 IN_PROFILE = "in the profile"  # Of what was found, or the base has: it is not looked for any more.
@@ -70,10 +70,10 @@ def _entry(fitted: Fitted, what: str, acts: str, why: str, smallest: float, boun
     minutes = float(fitted.coarse.valid.sum()) / 60.0
     more = minutes * max((smallest / AIMS[acts]) ** 2 - 1.0, 0.0)
 
-    def told(size: float) -> float | None:
-        return None if size > LARGEST[acts] else float(np.exp(size)) if acts == "spread" else size
+    def stated(size: float) -> float | None:
+        return None if size > LARGEST_SIZES[acts] else float(np.exp(size)) if acts == "spread" else size
 
-    return Shown(what, acts, True, why, told(smallest), told(bound), more)
+    return Shown(what, acts, True, why, stated(smallest), stated(bound), more)
 
 
 def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Iterator[Shown]:
@@ -116,7 +116,7 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
         if name in named:
             yield Shown(name, acts, True, IN_PROFILE)
         else:
-            why = "not found" if smallest <= LARGEST[acts] else "not found; it hardly changes within drives"
+            why = "not found" if smallest <= LARGEST_SIZES[acts] else "not found; it hardly changes within drives"
             yield _entry(fitted, name, acts, why, smallest, bound)
 
 

@@ -63,6 +63,6 @@ def _outermost(strength: FloatArray) -> tuple[int, int]:
     weak = np.flatnonzero(strength <= strength.min() + near)
     strong = np.flatnonzero(strength >= strength.max() - near)
     apart = np.abs(weak[:, None] - strong)
-    one, other = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    low, high = sorted((int(weak[one]), int(strong[other])))
+    first, second = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    low, high = sorted((int(weak[first]), int(strong[second])))
     return low, high

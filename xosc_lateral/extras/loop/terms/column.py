@@ -19,7 +19,7 @@ from xosc_lateral.extras.loop.timeline import Coarse
 DRIVING_QUANTILES = (0.05, 0.95)  # Of a column in these drives: its ends. [-]
 GRID = 19  # Quantiles between them at which an effect may be strongest. [-]
 SHARE_WITHOUT = 0.05  # Of the time without anybody from which "none" is an end of a column. [-]
-FEW = 12  # Different values up to which each is looked at. [-]
+FEW_VALUES = 12  # Different values up to which each is looked at. [-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +110,8 @@ def driven_values(coarse: Coarse, columns: Sequence[str]) -> tuple[tuple[float |
         grid = (
             np.unique(np.quantile(seen, np.linspace(*DRIVING_QUANTILES, GRID), method="nearest")) if len(seen) else seen
         )
-        if len(levels) <= FEW or len(grid) == 1:  # a switch, however rarely it is on
-            grid = levels if len(levels) <= FEW else levels[[0, -1]]
+        if len(levels) <= FEW_VALUES or len(grid) == 1:  # a switch, however rarely it is on
+            grid = levels if len(levels) <= FEW_VALUES else levels[[0, -1]]
         often_none = len(seen) < (1.0 - SHARE_WITHOUT) * len(values)
         driven.append((*([None] if often_none or not len(seen) else []), *grid.tolist()))
     return tuple(driven)

@@ -85,11 +85,11 @@ class MeanTerm(SearchedTerm):
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change over the driving range; of one column also what the car does in a typical passage."""
-        described, effect, own = super().describe(fitted, effects, key), effects[0], self.own_slopes(fitted)
-        if own is not None and own.differ:
-            described = replace(described, own_slopes=own)
-            if own.there:
-                size, error = described.size_m * own.size_there, abs(described.size_m) * own.error_there
+        described, effect, slopes = super().describe(fitted, effects, key), effects[0], self.own_slopes(fitted)
+        if slopes is not None and slopes.differ:
+            described = replace(described, own_slopes=slopes)
+            if slopes.there:
+                size, error = described.size_m * slopes.size_there, abs(described.size_m) * slopes.error_there
                 described = replace(described, size_m=size, size_error=error)
         if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
             return described
@@ -102,11 +102,11 @@ class MeanTerm(SearchedTerm):
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
         wide = structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors))
-        own = self.own_slopes(fitted)
-        if own is None or not own.differ:
+        slopes = self.own_slopes(fitted)
+        if slopes is None or not slopes.differ:
             return (wide,)
         sizes = fitted.sizes[part]  # not shrunk: where drives differ, a mean within its error of nothing is no doubt
-        scatter = tuple(own.scatter * np.abs(sizes))
+        scatter = tuple(slopes.scatter * np.abs(sizes))
         return (structs.replace(wide, coefficients=tuple(sizes), between_drivers=scatter),)
 
     def own_slopes(self, fitted: Fitted) -> OwnSlopes | None:
