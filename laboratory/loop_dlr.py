@@ -19,7 +19,7 @@ from laboratory.markers import show
 from laboratory.refined import refine_population
 from xosc_lateral.extras.loop.close import LoopResult
 from xosc_lateral.extras.loop.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure
-from xosc_lateral.extras.loop.loop_page import loop_text
+from xosc_lateral.extras.loop.loop_words import loop_text
 from xosc_lateral.extras.loop.residual import LackOfFit
 from xosc_lateral.files.drives import read_drives
 

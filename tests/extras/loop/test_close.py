@@ -123,11 +123,9 @@ def test_what_a_missing_column_did_is_reported_as_unexplained_or_as_hidden(drive
     drives = driven(303, [plants.truck_avoidance(1.2)], 2400.0, drop=["truck_right"])
     result = close_loop(drives, seed=1)
     assert not any(finding.kind == "location" for finding in result.findings)
-    record = loop_record(result, [])["unexplained"]
     beyond = max(result.error_after**2 - result.floor**2, 0.0) ** 0.5
-    assert record["size_m"] == pytest.approx(beyond)
     assert beyond > 0.01 or any(not finding.columns for finding in result.findings)
-    assert record["sentence"]
+    assert "What is not recorded cannot be named" in loop_record(result, [])["unexplained"]["sentence"]
 
 
 @pytest.fixture(scope="module")

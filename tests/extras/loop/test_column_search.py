@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from tests.kit.coarse import coarse_of, movement, wander
-from xosc_lateral.drivers.model.effects import Acts, Linear
+from tests.kit.coarse import STEP, coarse_of, movement, wander
+from xosc_lateral.drivers.model.effects import Acts, Linear, Saturating
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.column_search import ColumnSearch
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
+from xosc_lateral.extras.loop.identify import search_of
 from xosc_lateral.extras.loop.model import Outcome, fit_model
 from xosc_lateral.extras.loop.selection import ERROR_BUDGET, select
 from xosc_lateral.extras.loop.terms.mean import MeanTerm
@@ -140,3 +143,31 @@ def test_a_true_product_is_named_beside_its_parts() -> None:
     columns = [Column(name, Values.NUMBER, False) for name in ("other", "x")]
     found = select(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET))
     assert ("other", "x") in [one.term.columns for one in found.accepted]
+
+
+def test_the_side_of_the_last_bend_is_named_with_its_side(last_bends: Coarse) -> None:
+    """A driver who keeps 0.16 m to the side of the last bend until the next: no curvature of the moment says so."""
+    search = search_of(last_bends, np.random.SeedSequence(1), (), {})[1]
+    outcome = ColumnSearch(search, MeanTerm, fit_model(last_bends, ())).outcome()
+    assert outcome is not None and outcome.after is not None and outcome.p_value < 1e-6
+    effect = outcome.after.effects_of(outcome.after.terms[0])[0]
+    assert isinstance(effect, Saturating) and effect.episode > 0.0
+    ends = ends_of(effect)
+    assert ends is not None
+    assert ends.low["curvature"] < 0.0 < ends.high["curvature"]
+    assert ends.change == pytest.approx(0.32, abs=0.06)
+
+
+@pytest.fixture
+def last_bends() -> Coarse:
+    """Three drives of ten minutes, a bend every 35 s."""
+    rng, n, keep = np.random.default_rng(1), 3000, np.exp(-STEP / 2.0)
+    bends = np.zeros((3, n))
+    for one in bends:
+        for start in range(50, n - 75, 175):
+            one[start : start + 50] = rng.choice([-1.0, 1.0]) * rng.uniform(0.001, 0.004) * np.hanning(50)
+    number = np.maximum.accumulate(np.where(np.abs(bends) > 5e-4, np.arange(n), 0), axis=1)
+    sides = np.sign(np.take_along_axis(bends, number, axis=1)) * (number > 0)
+    moved = lfilter([1.0 - keep], [1.0, -keep], sides, axis=1)
+    offset = np.concatenate([0.16 * one + movement(rng, 600.0) for one in moved])
+    return coarse_of(offset, {"curvature": bends.ravel()}, drives=3)

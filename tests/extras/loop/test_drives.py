@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tests.kit.coarse import PAD, SPREAD, STEP, coarse_of, movement
+from tests.kit.coarse import PAD, SPREAD, STEP, coarse_of, movement, wander
+from xosc_lateral.drivers.model.effects import Acts, Factor, Linear, Product
+from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, regress, slope_alike
 from xosc_lateral.extras.loop.model import Fitted, fit_model
-from xosc_lateral.extras.loop.selection import ERROR_BUDGET, select
+from xosc_lateral.extras.loop.selection import BY_PRODUCT, ERROR_BUDGET, Accepted, Selection, select
 from xosc_lateral.extras.loop.shown import Shown, what_drives_show
 from xosc_lateral.extras.loop.terms.between import BetweenSpreadTerm, BetweenTerm, whole_drive_columns
+from xosc_lateral.extras.loop.terms.mean import MeanTerm
 from xosc_lateral.extras.loop.terms.time import ALIKE, StepTerm, TimeMeanTerm, TimeSpreadTerm, mean_alike, spread_alike
 from xosc_lateral.extras.loop.timeline import Coarse
 
@@ -126,7 +129,7 @@ def test_of_four_drives_nothing_between_them_can_be_told() -> None:
     search, fitted = search_of(coarse, "passengers"), fit_model(coarse, ())
     assert BetweenTerm.test(search, fitted) is None
     assert BetweenSpreadTerm.test(search, fitted) is None
-    told = [one for one in what_drives_show(search, fitted, {}) if one.what.startswith("passengers")]
+    told = [one for one in what_drives_show(search, fitted) if one.what.startswith("passengers")]
     assert [one.tested for one in told] == [False, False]
     assert all("cannot be told" in one.why and "4 drives" in one.why for one in told)
 
@@ -144,7 +147,7 @@ def test_the_regression_over_drives_is_honest_with_five_of_them() -> None:
 
 def shown(coarse: Coarse, fitted: Fitted | None = None, *, plan: bool = False) -> dict[tuple[str, str], Shown]:
     search = search_of(coarse, "x")
-    looks = what_drives_show(search, fitted or fit_model(coarse, ()), {"clock": "why"}, plan=plan)
+    looks = what_drives_show(search, fitted or fit_model(coarse, ()), plan=plan)
     return {(one.what, one.acts): one for one in looks}
 
 
@@ -154,7 +157,7 @@ def test_what_drives_can_show_is_stated_for_every_look() -> None:
     coarse = drives(35, np.zeros((5, N)), np.ones((5, N)), {"x": x})
     looks, plan = shown(coarse), shown(coarse, plan=True)
     assert {what for what, _ in looks} == {
-        *("clock", "x", "time", "step", "cycle", "regimes", "products of two columns"),
+        *("x", "time", "step", "cycle", "regimes", "products of two columns"),
     }
     by_x = looks["x", "mean"]
     assert by_x.smallest is not None and by_x.bound is not None
@@ -180,3 +183,63 @@ def test_an_effect_of_the_stated_size_is_found_in_most_and_of_a_third_in_few() -
             found[share] += any(one.term.columns == ("x",) for one in selected.accepted)
     assert found[1.0] >= 2
     assert found[0.33] <= 1
+
+
+# ---- what acts in some drives ----
+def some_drives(seed: int, slopes: np.ndarray, seconds: float) -> Coarse:
+    """A column that moves each drive by its own slope, answered within two seconds, and one that moves none."""
+    rng, n = np.random.default_rng(seed), round(seconds / STEP)
+    x, idle = (np.concatenate([wander(rng, n, 10.0) for _ in slopes]) for _ in range(2))
+    answered = np.concatenate([respond(part, STEP, 0.0, 2.0) for part in x.reshape(len(slopes), n)])
+    own = np.concatenate([movement(rng, seconds) for _ in slopes])
+    return coarse_of(np.repeat(slopes, n) * answered + own, {"x": x, "idle": idle}, drives=len(slopes))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_acts_in_some_drives_is_named_with_them_and_the_size_that_it_has_there(seed: int) -> None:
+    coarse = some_drives(seed, 0.15 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0]), 240.0)
+    found = MeanTerm.test(search_of(coarse, "x", "idle"), fit_model(coarse, ()))
+    assert found is not None and found.term is not None and found.columns == ("x",)
+    fitted = found.after or fit_model(coarse, (found.term,))
+    told = found.term.describe(fitted, fitted.effects_of(found.term), "mean 0")
+    assert told.own_slopes is not None
+    assert {"d0", "d3", "d6"} <= set(told.own_slopes.there)
+    assert len(told.own_slopes.there) <= 4
+    reach = np.subtract(*np.quantile(coarse.context["x"], [0.95, 0.05]))
+    assert told.size_m == pytest.approx(0.15 * reach, rel=0.25)
+    assert fitted.effects_of(found.term)[0].between_drivers[0] > 0.02  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("drives", [8, 24])
+def test_slopes_that_cancel_over_drives_are_found_and_none_where_there_are_none(drives: int) -> None:
+    """To the left in one drive as to the right in the next: no common slope."""
+    to_and_fro = 0.15 * (-1.0) ** np.arange(drives)
+    coarse = some_drives(5, to_and_fro, 180.0)
+    found = MeanTerm.test(search_of(coarse, "x", "idle"), fit_model(coarse, ()))
+    assert found is not None and found.term is not None and found.columns == ("x",)
+    none = some_drives(6, np.zeros(drives), 180.0)
+    silent = MeanTerm.test(search_of(none, "x", "idle"), fit_model(none, ()))
+    assert silent is not None and silent.term is None
+
+
+def test_drives_that_are_all_alike_are_not_said_to_differ() -> None:
+    """60 sets in the laboratory: p below 0.05 on a tenth, below 0.01 on one in forty; here of eight none below 1e-3."""
+    term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
+    for seed in range(8):
+        own = term.own_slopes(fit_model(some_drives(20 + seed, np.full(6, 0.15), 180.0), (term,)))
+        assert own is not None and own.p_value > 1e-3
+
+
+def test_a_column_comes_back_where_the_product_that_stood_for_it_goes() -> None:
+    coarse = some_drives(7, np.full(3, 0.15), 180.0)
+    factors = (Factor(column="x"), Factor(column="idle"))
+    alone = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x"))
+    both = MeanTerm.of(Product(acts=Acts.LOCATION, factors=factors))
+    start, fitted = fit_model(coarse, ()), fit_model(coarse, (alone, both))
+    found = Selection((Accepted(alone, 1e-9), Accepted(both, 1e-6)), (), start, fitted)
+    by_product = found.without([alone], BY_PRODUCT)
+    assert [one.term for one in by_product.accepted] == [both]
+    again = by_product.without([both], "it does not help")
+    assert [(one.term, one.p_value) for one in again.accepted] == [(alone, 1e-9)]
+    assert again.final.terms == (alone,)
+    assert [one.columns for one in again.rejected] == [("x", "idle")]

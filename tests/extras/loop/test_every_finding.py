@@ -32,7 +32,7 @@ from xosc_lateral.extras.loop import close, held_out, selection
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.loop_json import loop_record
-from xosc_lateral.extras.loop.loop_words import lack_of_fit_words
+from xosc_lateral.extras.loop.loop_words import verdict
 from xosc_lateral.extras.loop.model import Fitted, Outcome, Term, fit_model
 from xosc_lateral.extras.loop.residual import simulated_runs
 from xosc_lateral.extras.loop.selection import ERROR_BUDGET, TERMS, Accepted, Selection, select
@@ -215,13 +215,13 @@ def test_closing_words_that_fail_cost_no_finding(driven: Callable[..., list[Driv
     def breaks(*_: object, **__: object) -> None:
         raise ValueError("matmul")
 
-    for stage in ("_explained", "check_remainder", "what_drives_show"):
+    for stage in ("check_remainder", "what_drives_show"):
         monkeypatch.setattr(close, stage, breaks)
     table = simulate_drive(30.0, 1).table
     drop = [name for name in CONTEXT_UNITS if name in table and name not in ("truck_right", "speed")]
     result = close.close_loop(driven(101, [plants.truck_avoidance(0.5)], 700.0, drop=drop), seed=1)
     assert [finding.columns for finding in result.findings] == [("truck_right",)]
     failed = [one.component for one in result.identified.selection.rejected if "a fault of this program" in one.why]
-    assert failed == ["share of the explainable", "what is left", "what these drives can show"]
+    assert failed == ["what is left", "what these drives can show"]
     assert loop_record(result, [])["unexplained"]["omnibus"] is None
-    assert "the check failed" in lack_of_fit_words(result)
+    assert "the check failed" in verdict(result)

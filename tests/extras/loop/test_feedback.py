@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from xosc_lateral.extras.loop.columns import Assigned, Column, Feedback, Role, Values, find_feedback
+from xosc_lateral.extras.loop.columns import Assigned, Column, Feedback, Role, Values, find_feedback, roles_of
 from xosc_lateral.extras.loop.timeline import Timeline
 
 STEP = 0.2
@@ -204,3 +204,40 @@ def test_a_bend_that_is_answered_before_it_comes_stays_a_cause(seed: int) -> Non
     moved = offset + 0.5 * np.roll(bend, -round(1.0 / STEP))
     by_name = {"curvature": Assigned("curvature", Role.ROAD, "name")}
     assert not find_feedback(timeline(moved, curvature=bend), [Column("curvature", Values.NUMBER, False)], by_name)
+
+
+def bends(rng: np.random.Generator) -> np.ndarray:
+    """Bends of 250 m to 1 km radius, 5 to 15 s long, 10 to 40 s apart. [1/m]"""
+    curvature, at = np.zeros(N), 0
+    while at < N:
+        gap, length = (round(rng.uniform(*seconds) / STEP) for seconds in ((10.0, 40.0), (5.0, 15.0)))
+        inside = curvature[at + gap : at + gap + length]
+        inside[:] = rng.choice([-1.0, 1.0]) * rng.uniform(0.001, 0.004) * np.hanning(len(inside) + 2)[1:-1]
+        at += gap + length
+    return curvature
+
+
+@pytest.mark.parametrize("seed", range(50, 58))
+@pytest.mark.parametrize(("size", "noise", "response"), [(100.0, 0.05, 0.5), (200.0, 0.03, 0.3)])
+def test_bends_seen_ahead_are_no_consequence_and_the_car_s_own_turning_is(
+    seed: int, size: float, noise: float, response: float
+) -> None:
+    """A driver who looks 1.5 s ahead moves as if he predicted the bends, by 0.4 m and more."""
+    rng = np.random.default_rng(seed)
+    curvature, keep = bends(rng), np.exp(-STEP / response)
+    ahead = np.roll(curvature, -round(1.5 / STEP))
+    offset = size * lfilter([1.0 - keep], [1.0, -keep], ahead) + noise * low_passed(5.0, rng)
+    turning = np.gradient(np.gradient(offset, STEP), STEP)
+    columns = {
+        "curvature": curvature,
+        "yaw_rate": 30.0 * curvature + turning / 30.0 + 0.002 * rng.normal(size=N),
+        "lateral_acceleration": 900.0 * curvature + turning + 0.05 * rng.normal(size=N),
+        "steering_wheel_angle": 4e4 * curvature + 40.0 * turning + 0.5 * rng.normal(size=N),
+        "lane_place": offset + 0.01 * rng.normal(size=N),
+        "yaw_as_road": 30.0 * curvature + turning / 30.0 + 0.002 * rng.normal(size=N),
+    }
+    line = timeline(offset, **columns)
+    known = [Column(name, Values.NUMBER, False) for name in columns]
+    declared = {"yaw_as_road": "road"}
+    dismissed = {one.column for one in find_feedback(line, known, roles_of(line, columns, declared))}
+    assert dismissed == {"yaw_rate", "lateral_acceleration", "steering_wheel_angle", "lane_place"}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from examples.driver_simulator.plants import ShiftBy, SimulatedResponse
 from examples.driver_simulator.simulator import simulate_drive
@@ -31,6 +32,7 @@ from xosc_lateral.drivers.model.effects import (
     Threshold,
     TimeSmooth,
 )
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop.close import Finding, LoopResult, close_loop
 from xosc_lateral.extras.loop.loop_curves import curve_of, moving_spread
 from xosc_lateral.extras.loop.loop_figures import (
@@ -41,16 +43,18 @@ from xosc_lateral.extras.loop.loop_figures import (
     residual_figure,
 )
 from xosc_lateral.extras.loop.loop_json import column_record, finding_record, finite, loop_record
-from xosc_lateral.extras.loop.loop_page import finding_sentence, loop_page, loop_text
+from xosc_lateral.extras.loop.loop_page import loop_page
 from xosc_lateral.extras.loop.loop_words import (
-    lack_of_fit_words,
+    finding_sentence,
+    loop_text,
     meaning,
     others_words,
     outcome,
     p_value_words,
     size_words,
+    verdict,
 )
-from xosc_lateral.extras.loop.residual import lack_of_fit_of
+from xosc_lateral.extras.loop.omnibus import Omnibus
 from xosc_lateral.extras.loop.selection import Rejected
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.pages.chart import Panel
@@ -112,16 +116,16 @@ def hidden(result: LoopResult, effect: Effect | None, kind: str, statistic: str 
 def test_the_page_says_in_words_what_was_found_how_sure_and_when(page: str, result: LoopResult) -> None:
     finding = result.findings[0]
     assert finding.columns == ("grade",)
-    assert f"mean offset by grade ({size_words(finding)})" in page
+    assert f"mean offset by grade ({size_words(finding).partition(' as ')[0]}" in page
     assert "further left" in page
     assert "is found practically never (p = " in page
-    assert re.search(r"The driver responds (at once|[\d.]+ s (in advance|later))", page)
+    assert re.search(r"begins (at once|[\d.]+ s (ahead|later)), response time [\d.]+ s", page)
 
 
 def test_what_would_explain_as_much_is_said_by_its_columns(result: LoopResult) -> None:
     found = replace(result.findings[0], columns=("grade", "speed"), alike=(("grade",), ("crossfall", "speed")))
-    assert others_words(found, "`") == "`grade` alone, or `crossfall` with `speed`"
-    assert "grade alone, or crossfall with speed would explain it about as well" in finding_sentence(found)
+    assert others_words(found) == "`grade` alone, or `crossfall` with `speed`"
+    assert "`grade` alone, or `crossfall` with `speed` would explain it about as well" in finding_sentence(found)
     record = finding_record(found)
     assert record["alike"] == ["crossfall"]
     assert record["instead"] == [["grade"], ["crossfall", "speed"]]
@@ -169,30 +173,26 @@ def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopRe
     assert figure.panels[0].title == "grade [%]"  # columns of the effects come first
 
 
-def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResult, table: Path) -> None:
-    # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
-    scored = replace(result.scored, after=result.scored.before, runs_after=result.scored.runs_before)
-    # and halves of forty minutes that differ by a third of what they do
-    halves = [{name: values / 3.0 for name, values in half.items()} for half in scored.halves]
-    left = lack_of_fit_of(scored.real, scored.before, scored.after, halves)
-    assert left.unexplained == pytest.approx(np.sqrt(result.error_before**2 - left.floor**2))
-    left = replace(left, p_value=0.01)  # how rare that is is not asked here
-    worse = replace(result, findings=(), scored=scored, lack_of_fit=left)
-    assert left.is_clear
-    sentence = lack_of_fit_words(worse)
-    assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
-    record = loop_record(worse, [table])
-    assert record["unexplained"]["clear"] is True
-    assert record["unexplained"]["size_m"] == pytest.approx(left.unexplained)
-    assert record["unexplained"]["where"] == [group.name for group in left.where]
-    assert sentence in loop_text(worse)
+@pytest.mark.parametrize("p_value", [0.4, 1e-6])
+def test_there_is_one_verdict_and_it_is_that_of_what_is_left(result: LoopResult, table: Path, p_value: float) -> None:
+    told = replace(result, remainder=Omnibus(p_value, ("rain",), 0.02))
+    sentence = verdict(told)
+    assert ("no more than chance" in sentence) == (p_value > 0.05)
+    assert ("More is left than chance: `rain`" in sentence) == (p_value <= 0.05)
+    assert "What is not recorded cannot be named: a cause that comes and goes with `grade` looks the same." in sentence
+    assert "Four of five changes of the mean by" in sentence
+    assert loop_record(told, [table])["unexplained"]["sentence"] == sentence
+    assert loop_text(told).endswith(sentence)
+    assert "explainable" not in loop_text(told)
 
 
-def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
-    scored = result.scored
-    at_floor = lack_of_fit_of(scored.real, scored.before, scored.real, scored.halves)
-    assert not at_floor.is_clear
-    assert "do not exceed the difference between halves" in lack_of_fit_words(replace(result, lack_of_fit=at_floor))
+def test_nobody_is_told_of_looks_that_could_never_be_taken(result: LoopResult) -> None:
+    """Consequences and clocks are no looks; sizes are those of drivers."""
+    looks = {one.what for one in result.shown}
+    assert looks.isdisjoint({one.column for one in result.identified.usable.feedback})
+    sizes = [size for one in result.shown for size in (one.smallest, one.bound) if size is not None]
+    assert max(sizes) <= 5.0 + 1e-9
+    assert "22026" not in loop_text(result)
 
 
 def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, table: Path) -> None:
@@ -204,7 +204,6 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, t
     assert finding["kind"] == "location"
     assert "grade" in finding["meaning"]
     assert {row["group"] for row in record["residual"]} == set(result.scored.real)
-    assert record["unexplained"]["clear"] is result.lack_of_fit.is_clear
 
 
 @pytest.mark.parametrize("effect", HIDDEN, ids=lambda effect: effect.kind)
@@ -224,15 +223,18 @@ def test_what_a_core_model_lacks_has_a_picture(result: LoopResult, kind: str) ->
 
 @pytest.mark.parametrize("kind", ["periodic", "drift", "step", "scale", "regime", "memory", "population"])
 def test_every_hidden_kind_is_told_in_plain_words(result: LoopResult, kind: str) -> None:
-    words = meaning(hidden(result, None, kind), result)
+    words = meaning(hidden(result, None, kind))
     assert words[0].isupper()
     assert not words.startswith("(")
 
 
 @pytest.mark.parametrize("effect", SHAPES, ids=lambda effect: f"{effect.kind}-{effect.acts.value}")
 def test_every_shape_is_told_and_drawn(result: LoopResult, effect: ColumnEffect) -> None:
-    finding = replace(result.findings[0], effects=(effect,), columns=effect.columns)
-    words = meaning(finding, result)
+    sized = structs.replace(effect, driven=((0.0, 1.0),) * len(effect.columns))
+    kind = "location" if effect.acts is Acts.LOCATION else "scale"
+    told = {"ends": ends_of(sized), "kind": kind, "size_m": 1.2, "effects": (effect,), "columns": effect.columns}
+    finding = replace(result.findings[0], **told)
+    words = meaning(finding)
     assert all(column in words for column in effect.columns)
     curve = curve_of(result, effect)
     assert np.isfinite(curve.strength).all() and np.isfinite(curve.error).all()

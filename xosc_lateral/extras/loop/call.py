@@ -147,12 +147,12 @@ class LoopPlan(Result):
 
     def headline(self) -> str:
         """One line."""
-        from xosc_lateral.extras.loop.loop_shown import shown_words
+        from xosc_lateral.extras.loop.loop_words import shown_words
 
         return shown_words(self._shown)
 
     def __str__(self) -> str:
-        from xosc_lateral.extras.loop.loop_shown import shown_text
+        from xosc_lateral.extras.loop.loop_words import shown_text
 
         return shown_text(self._shown)
 
@@ -230,7 +230,7 @@ class ClosedLoop(Result):
         return f"{names}; {error} ({self.floor:.4f} m between halves of the drives)"
 
     def __str__(self) -> str:
-        from xosc_lateral.extras.loop.loop_page import loop_text
+        from xosc_lateral.extras.loop.loop_words import loop_text
 
         return "\n".join([loop_text(self._result), *self.message_lines()])
 

@@ -33,6 +33,7 @@ FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 NEAR_SHARE = 2.0 / 3.0  # A distance comes near: its 5 % quantile is below this share of its median. [-]
 # Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]
 PHASES = np.pi * np.arange(4) / 4.0
+LAST_SIDE = float(np.tanh(2.0))  # What a saturating quantity is at twice its scale; from there on it is +-1. [-]
 # Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
 # twenty times as much.
 MAX_PRODUCT_COLUMNS = 24
@@ -156,8 +157,12 @@ def _bent(column: Column, values: FloatArray, limits: Sequence[float] = LIMITS) 
             yield effects.Saturating(acts=Acts.LOCATION, column=name, middle=middle, scale=width * (high - low))
     if seen.min() < 0.0 < seen.max():
         yield effects.Magnitude(acts=Acts.LOCATION, column=name)
-        for size in np.unique(_quantiles(np.abs(seen), [share for share in limits if share >= 0.5])).tolist():
+        sizes = np.unique(_quantiles(np.abs(seen), [share for share in limits if share >= 0.5]))
+        for size in sizes[sizes > 0.0].tolist():
             yield effects.Linear(acts=Acts.LOCATION, column=name, episode=size)
+            # to which side the last bend beyond the size went, however sharp it was
+            to_a_side = {"middle": 0.0, "scale": 0.5 * size, "episode": LAST_SIDE}
+            yield effects.Saturating(acts=Acts.LOCATION, column=name, **to_a_side)
     for share in SCALES if column.gaps else ():
         if (scale := _scale(values, share)) > 0.0:
             yield effects.Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale)

@@ -24,16 +24,16 @@ from xosc_lateral.drivers.model.seeds import generator
 from xosc_lateral.extras.loop import held_out
 from xosc_lateral.extras.loop.core_model import DriverVariance, SpectrumShape, compare_spectrum_shapes, test_population
 from xosc_lateral.extras.loop.held_out import HeldOut, Scorecard, Setting
-from xosc_lateral.extras.loop.identify import Identified, Progress, folds_of, identify, initial_terms, search_of
+from xosc_lateral.extras.loop.identify import Identified, Progress, identify, initial_terms, search_of
 from xosc_lateral.extras.loop.model import Description, Fitted, Term, fit_model
-from xosc_lateral.extras.loop.omnibus import Explained, Omnibus, check_remainder, explained_share
+from xosc_lateral.extras.loop.omnibus import Omnibus, check_remainder
 from xosc_lateral.extras.loop.refinement import Alternatives
 from xosc_lateral.extras.loop.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.extras.loop.selection import UNFORESEEN, Accepted, Gain, Rejected, Selection, failed
 from xosc_lateral.extras.loop.shown import Shown, what_drives_show
 from xosc_lateral.extras.loop.significance import LoopSeed
 from xosc_lateral.extras.loop.terms.between import between_shift
-from xosc_lateral.extras.loop.timeline import Coarse, coarse_middle, join_drives
+from xosc_lateral.extras.loop.timeline import Coarse, join_drives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -105,7 +105,6 @@ class LoopResult:
     scored: HeldOut  # Both profiles on held-out blocks.
     lack_of_fit: LackOfFit  # What is left.
     remainder: Omnibus | None  # Whether any column predicts it; None: not known, for the check failed.
-    explained: Explained | None  # Of what columns can explain, on held-out blocks; None: nothing can be held out.
     scores: Scorecard  # The ten metrics.
     shown: tuple[Shown, ...]  # What these drives can show.
     seed: int
@@ -200,14 +199,13 @@ def close_loop(
         scored=scored,
         lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         scores=held_out.score_runs(timeline, scored.runs_before, scored.runs_after, setting.blocks, rng),
-        explained=_closing(faults, "share of the explainable", lambda: _explained(setting, identified), None),
         remainder=_closing(
             faults, "what is left", lambda: check_remainder(selection.final, identified.quantities, verdict), None
         ),
         shown=_closing(
             faults,
             "what these drives can show",
-            lambda: tuple(what_drives_show(identified.search, selection.final, identified.usable.not_tested)),
+            lambda: tuple(what_drives_show(identified.search, selection.final)),
             (),
         ),
         identified=replace(identified, selection=replace(selection, rejected=(*selection.rejected, *faults))),
@@ -236,8 +234,8 @@ def plan_loop(
 ) -> list[Shown]:
     """What drives can show before any effect is sought: sizes that would be found with 80 % probability."""
     coarse = Coarse.of(join_drives(drives))
-    usable, search = search_of(coarse, np.random.SeedSequence(seed), excluded, roles)
-    return what_drives_show(search, fit_model(coarse, ()), usable.not_tested, plan=True)
+    _, search = search_of(coarse, np.random.SeedSequence(seed), excluded, roles)
+    return what_drives_show(search, fit_model(coarse, ()), plan=True)
 
 
 def _that_helps(setting: Setting, identified: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
@@ -272,20 +270,6 @@ def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
             loss = (after**2 - before**2) / max(float(chance), 1e-300)
             worst = max(worst, (loss, accepted.term), key=lambda pair: pair[0])
     return worst[1]
-
-
-def _explained(setting: Setting, identified: Identified) -> Explained | None:
-    """Share of the explainable; where nothing is kept, the effects explain nothing."""
-    coarse, blocks = setting.coarse, coarse_middle(setting.blocks)[: len(setting.coarse)]
-    if identified.nested is not None:
-        folds = identified.nested.scored
-        starts, finals = [one.start for one in folds], [one.final for one in folds]
-    else:
-        number, terms = folds_of(blocks), identified.selection.start.terms
-        if number < 2:
-            return None
-        starts = finals = [fit_model(coarse.only(blocks % number != fold), terms) for fold in range(number)]
-    return explained_share(starts, finals, identified.quantities, coarse, blocks)
 
 
 def _accepted(selection: Selection) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:

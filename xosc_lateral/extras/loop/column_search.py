@@ -27,6 +27,7 @@ from xosc_lateral.extras.loop.dictionary import (
     orthonormal,
     score_entries,
 )
+from xosc_lateral.extras.loop.drives import counted
 from xosc_lateral.extras.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.extras.loop.omnibus import courses
 from xosc_lateral.extras.loop.refinement import Refined, Refinement
@@ -48,7 +49,7 @@ GROWTH_ERRORS = 2.0
 # Directions of a column's plain responses with less than this share of the largest variance have no slope of their own
 # in every drive. [-]
 OWN_SLOPES = 0.2
-FEWEST = 3  # Drives from which slopes of their own are looked at.
+FEWEST, MOST_DRIVES = 3, 60  # Drives of two minutes from which, and up to which, slopes of their own are looked at.
 ROUNDS = 2  # Times that the candidates are scored beside what was found before; the first changes most.
 
 
@@ -91,12 +92,12 @@ class _Scored:
     maxima: FloatArray  # shape (draws,): The largest that the null gives.
     left: FloatArray  # shape (seconds,): What the scores are of.
     span: Callable[[str], FloatArray]  # All that a column does alone, shape (seconds, rank), orthonormal.
-    own: Callable[[str], FloatArray]  # What it does with slopes of each drive's own, shape (seconds, k).
+    by_drive: Callable[[str], FloatArray]  # What it does with slopes of each drive's own, shape (seconds, k).
 
     @cached_property
     def scores(self) -> FloatArray:
         """Squared score less cost, shape (entries,); -inf: barred."""
-        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span, self.own)
+        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span, self.by_drive)
 
     @property
     def best(self) -> int:
@@ -169,8 +170,8 @@ class ColumnSearch:
         self, scored: _Scored, refused: Collection[tuple[str, ...]], only: tuple[str, ...] = ()
     ) -> tuple[int | None, float]:
         """The plain entry that explains most with a slope of each drive's own, and its p-value by the same null."""
-        drive = self.search.coarse.drive[scored.problem.whitener.valid]
-        drives, candidates = np.unique(drive), scored.dictionary.candidates
+        coarse, rows = self.search.coarse, scored.problem.whitener.valid
+        drive, candidates, lasting = coarse.drive[rows], scored.dictionary.candidates, np.flatnonzero(counted(coarse))
         taken = {term.columns for term in of_kind(self.fitted, self.kind)} | set(refused)
         barred = self.kind.barred(self.fitted)
         plain = [
@@ -178,19 +179,24 @@ class ColumnSearch:
             for i, one in enumerate(candidates)
             if one.family is Family.PLAIN and one.columns not in taken and barred.isdisjoint(one.columns)
         ]
-        if self.kind.acts is not Acts.LOCATION or not FEWEST <= len(drives) < MANY_DRIVES or not plain:
+        if self.kind.acts is not Acts.LOCATION or not FEWEST <= len(lasting) <= MOST_DRIVES or not plain:
             return None, 1.0
-        null = draw_null(scored.left, drive, generator(self.search.seed, LoopSeed.COLUMNS))
-        found = (scored.own(name) for term in of_kind(self.fitted, self.kind) for name in term.columns)
-        known = orthonormal(np.concatenate([scored.known, *found], axis=1), CROSS_BASIS)
-        rows = beside(known, np.concatenate([scored.left[:, None], null], axis=1))
+        rng = generator(self.search.seed, LoopSeed.COLUMNS)
+        if coarse.drives < MANY_DRIVES:
+            null = draw_null(scored.left, drive, rng)
+        else:  # signs of whole drives leave the square of a drive's own slope as it is: signs of minutes
+            minutes = np.unique(coarse.cluster[rows], return_inverse=True)[1]
+            null = scored.left[:, None] * rng.choice([-1.0, 1.0], size=(minutes.max() + 1, NULL_DRAWS))[minutes]
+        known_slopes = (scored.by_drive(name) for term in of_kind(self.fitted, self.kind) for name in term.columns)
+        known = orthonormal(np.concatenate([scored.known, *known_slopes], axis=1), CROSS_BASIS)
+        left = beside(known, np.concatenate([scored.left[:, None], null], axis=1))
         entries = beside(known, scored.dictionary.rows[plain].astype(np.float64).T)
-        explained = np.zeros((len(plain), rows.shape[1]))
-        for one in drives:
-            own = entries[drive == one].T
-            power = np.square(own).sum(axis=1)
-            there = power > 3.0 * LEFT_OVER / len(drives)  # a copy of what was found has nothing left
-            explained[there] += np.square(own[there] @ rows[drive == one]) / power[there, None]
+        explained = np.zeros((len(plain), left.shape[1]))
+        for number in lasting:
+            slopes = entries[drive == number].T
+            power = np.square(slopes).sum(axis=1)
+            there = power > 3.0 * LEFT_OVER / len(lasting)  # a copy of what was found has nothing left
+            explained[there] += np.square(slopes[there] @ left[drive == number]) / power[there, None]
         names = [i for i in range(len(plain)) if not only or candidates[plain[i]].columns == only]
         if not names:
             return None, 1.0
@@ -258,14 +264,14 @@ class ColumnSearch:
             return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
 
         @cache
-        def own(column: str) -> FloatArray:
+        def by_drive(column: str) -> FloatArray:
             plain = [i for i, one in enumerate(candidates) if one.columns == (column,) and one.family is Family.PLAIN]
-            if not plain or not 1 < len(drives) < MANY_DRIVES:
+            if not plain or not 1 < len(drives) <= MOST_DRIVES:
                 return np.zeros((len(left), 0))
             leading = orthonormal(dictionary.rows[plain].astype(np.float64).T, OWN_SLOPES)
             return np.concatenate([leading * (drive == one)[:, None] for one in drives], axis=1)
 
-        return _Scored(problem, dictionary, known, scores, maxima, left, span, own)
+        return _Scored(problem, dictionary, known, scores, maxima, left, span, by_drive)
 
     def _term(self, scored: _Scored, refused: Collection[tuple[str, ...]]) -> tuple[SearchedTerm, Fitted]:
         """The term that the best candidate becomes, and the fit with it.

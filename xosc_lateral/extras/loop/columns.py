@@ -206,6 +206,10 @@ FEEDBACK_SHARE, DOUBTFUL_SHARE, NEGLIGIBLE_SHARE = 0.05, 0.02, 0.003
 # Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
 # it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]
 FUNCTION_COHERENCE = 0.4
+# Part of the band from which on even a driver who sees a bend ahead and answers it within half a second shares less
+# than 0.15 with it, before which up to 0.85; what the movement brings about shares 0.5 and more in all parts. What its
+# name says to be road, weather or traffic is looked at there alone. [-]
+RESPONSE_FREE = 2
 # Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]
 MOVEMENT_QUANTILES = np.r_[0.005, 0.01, 0.02, np.linspace(0.04, 0.96, 24), 0.98, 0.99, 0.995]
 # Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]
@@ -250,11 +254,13 @@ def find_feedback(
         known = np.isfinite(values)
         values = np.where(known, values, np.median(values[timeline.valid & known]))
         seen, size = (segments.spectra(one) for one in (values, np.abs(values - np.median(values[timeline.valid]))))
-        shared = {name: segments.coherence(seen, is_movement) for name, is_movement in spectra.items()}
+        named = assigned.role.is_exogenous  # by its name
+        part = RESPONSE_FREE if named else 0
+        shared = {name: segments.coherence(seen, is_movement, part) for name, is_movement in spectra.items()}
         for name in ("size of the offset", "excess of the offset"):
-            shared[name] = max(shared[name], segments.coherence(size, spectra[name]))
+            shared[name] = max(shared[name], segments.coherence(size, spectra[name], part))
         by_function = {
-            name: segments.coherence(seen, segments.spectra(_mean_given(values, moved[name], timeline)))
+            name: segments.coherence(seen, segments.spectra(_mean_given(values, moved[name], timeline)), part)
             for name in ("offset", "lateral speed")
         }
         # a switch has hardly any changes that could be predicted
@@ -268,7 +274,7 @@ def find_feedback(
         doubtful = coherence >= max(DOUBTFUL_COHERENCE, chance) or predicted >= DOUBTFUL_SHARE
         if is_function and not clear:
             of = of_function
-        if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
+        if named:  # overruled where both marks are strong
             clear, doubtful = predicted >= FEEDBACK_SHARE and coherence >= max(DOUBTFUL_COHERENCE, chance), False
         is_movement = assigned.role is Role.OWN
         if is_movement or clear or is_function or doubtful:
@@ -350,9 +356,10 @@ class _Segments:
         pieces = np.diff(values, prepend=values[:1])[self._rows] * np.hanning(self._rows.shape[1])
         return np.asarray(np.fft.rfft(pieces, axis=1)[:, self._in_band])
 
-    def coherence(self, first: ComplexArray, second: ComplexArray) -> float:
-        """Squared, in the part of the band where most is shared: a shaky sensor hides the faster parts."""
+    def coherence(self, first: ComplexArray, second: ComplexArray, first_part: int = 0) -> float:
+        """Squared, in the part of the band, from one on, where most is shared: a shaky sensor hides the faster ones."""
         cross = np.abs(np.sum(first * np.conj(second), axis=0)) ** 2
         power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
         coherence = cross / np.maximum(power, 1e-300)
-        return float(max(coherence[self._part == index].mean() for index in np.unique(self._part)))
+        parts = np.unique(self._part[self._part >= first_part])
+        return float(max((coherence[self._part == index].mean() for index in parts), default=0.0))

@@ -110,13 +110,13 @@ def tells_drives(values: FloatArray, coarse: Coarse) -> bool:
     if coarse.drives == 1:
         return False
     inside, drive = coarse.timeline.valid, coarse.timeline.drive
-    seen, own = np.nan_to_num(values[inside], nan=0.0, posinf=0.0, neginf=0.0), drive[inside]
-    rows = np.bincount(own, minlength=coarse.drives)
-    usual = np.bincount(own, seen, minlength=coarse.drives) / np.maximum(rows, 1)
+    seen, of_drive = np.nan_to_num(values[inside], nan=0.0, posinf=0.0, neginf=0.0), drive[inside]
+    rows = np.bincount(of_drive, minlength=coarse.drives)
+    usual = np.bincount(of_drive, seen, minlength=coarse.drives) / np.maximum(rows, 1)
     there = usual[rows > 0]
     high = int(np.sum(there > 0.5 * (there.min() + there.max())))
     few = min(high, len(there) - high) < FEWEST_A_SIDE
-    return few and float(np.mean(np.square(seen - usual[own]))) < LEFT_WITHIN * float(seen.var())
+    return few and float(np.mean(np.square(seen - usual[of_drive]))) < LEFT_WITHIN * float(seen.var())
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
@@ -203,17 +203,18 @@ def _beside_loud_stretches(
         alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSE_ENTRIES]
         span = orthonormal(rows[alike].T)
         rest[[others == read for others in columns]] = beside(span, left)
-    power = np.maximum(np.square(rows).sum(axis=1), LEAST_POWER)
-    weights = np.square(rows) / power[:, None]
-    scatter = (weights * np.square(rest)).sum(axis=1)
+    robust, costs = scores.copy(), dictionary.costs[order]
+    robust[order] = (scores[order] + costs) / _loudness(rows, rest, left) - costs
+    return robust
+
+
+def _loudness(rows: FloatArray, rest: FloatArray, left: FloatArray) -> FloatArray:
+    """Mean square, at least 1, of what is left where entries act, shape (entries,); `rest` as their rows, or one."""
+    weights = np.square(rows) / np.maximum(np.square(rows).sum(axis=1), LEAST_POWER)[:, None]
     # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
     kurtosis = float(np.mean(left**4) / np.mean(left**2) ** 2)
-    scatter /= 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
-    scatter = np.maximum(scatter, 1.0)
-    robust = scores.copy()
-    costs = dictionary.costs[order]
-    robust[order] = (scores[order] + costs) / scatter - costs
-    return robust
+    sure = 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
+    return np.asarray(np.maximum((weights * np.square(rest)).sum(axis=1) / sure, 1.0))
 
 
 def beside_parts(
@@ -222,10 +223,10 @@ def beside_parts(
     left: FloatArray,
     known: FloatArray,
     spans: Callable[[str], FloatArray],
-    own: Callable[[str], FloatArray],
+    by_drive: Callable[[str], FloatArray],
 ) -> FloatArray:
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components. None
-    that explains less than slopes of each drive's `own` would: it would stand for which drive it is."""
+    that explains less than slopes of each drive's own (`by_drive`) would: it would stand for which drive it is."""
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -240,8 +241,12 @@ def beside_parts(
         rows = beside(span, dictionary.rows[entries].astype(np.float64).T)
         power = np.square(rows).sum(axis=0)
         rest = beside(span, left)
-        gains = np.square(rest @ rows) / np.maximum(power, LEAST_POWER) - dictionary.costs[entries]
-        slopes = [orthonormal(beside(span, own(column)), CROSS_BASIS) for column in pair]
+        gains = np.square(rest @ rows) / np.maximum(power, LEAST_POWER)
+        # what is left is louder in a bend, say, and there the product has its rows once the columns' own are out
+        best_rows = rows[:, np.argsort(-gains)[:RESPONSE_ENTRIES]]
+        unexplained = of_unit_variance(beside(orthonormal(best_rows), rest))
+        gains = gains / _loudness(rows.T, unexplained, left) - dictionary.costs[entries]
+        slopes = [orthonormal(beside(span, by_drive(column)), CROSS_BASIS) for column in pair]
         rivals = [as_one_degree(float(np.sum(np.square(rest @ one))), one.shape[1]) for one in slopes if one.shape[1]]
         usable = (power > LEFT_OVER) & (gains > max(map(float, rivals), default=-np.inf))
         scores[entries] = np.where(usable, np.minimum(scores[entries], gains), -np.inf)

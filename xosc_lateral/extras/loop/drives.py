@@ -33,8 +33,7 @@ MEAN_INFLATION, SPREAD_INFLATION, PRIOR_DRIVES = 2.1, 1.65, 4.0
 ROUNDS, VARIANCE_TOLERANCE = 50, 1e-9
 LEAST_SHARE = 0.1  # Of the usual information of a drive below which its own slope says nothing. [-]
 OWN_LEVEL = 0.01  # p-value up to which drives are said to differ. [-]
-SURE = 2.0  # Standard errors by which an effect is there in a drive. [-]
-DEGREES = 60.0  # Of freedom with which the variance that slopes have by chance is known. [-]
+SURE_LEVEL = 0.05  # Probability that an effect is said to act in any drive in which it does not. [-]
 POWER_Z = 0.84  # Standard normal quantile of a power of 80 %.
 BOUND_Z = 1.645  # Of a one-sided bound of 95 %.
 
@@ -139,18 +138,13 @@ def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled
 
 @dataclass(frozen=True, slots=True)
 class OwnSlopes:
-    """Whether an effect differs from drive to drive: slopes over the common one, shape (drives,)."""
+    """Whether an effect differs from drive to drive: each drive's slope over the common one."""
 
-    relative: FloatArray  # 1: as the effect is; 0: it does not act there; NaN: the drive says nothing.
-    error: FloatArray
     p_value: float  # That slopes scatter as much though all are alike. [-]
     scatter: float  # Standard deviation between drives. [-]
     there: tuple[str, ...]  # Drives in which it surely acts, by name.
-
-    @property
-    def relative_there(self) -> float:
-        """Mean slope of those. [-]"""
-        return float(np.mean(self.relative[self.relative > SURE * self.error]))
+    size_there: float  # Mean slope of those, each as likely as its own and all drives' say [2]_, with its error. [-]
+    error_there: float
 
     @property
     def differ(self) -> bool:
@@ -159,22 +153,32 @@ class OwnSlopes:
 
 
 def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes | None:
-    """Slopes of white rows, levels taken out, on the white path of an effect, shape (n,) each; None: too few drives."""
-    from scipy.stats import f
+    """Slopes of white rows, levels taken out, on the white path of an effect, shape (n,) each; None: too few drives.
+
+    What slopes scatter by though all are alike is what their minutes show (a clustered error; Liang, Zeger 1986), as
+    many as would tell as much if all moved the driver alike.
+    """
+    from scipy.stats import f, norm
 
     power = np.bincount(coarse.drive, path**2, minlength=coarse.drives)
     lasting = (counted(coarse) > 0.0) & (power > LEAST_SHARE * power.sum() / coarse.drives)
-    if (number := int(lasting.sum())) < FEWEST:
+    number, inside = int(lasting.sum()), lasting[coarse.drive] & coarse.valid
+    moved = np.bincount(coarse.cluster, path**2 * inside)
+    minutes = float(moved.sum() ** 2 / max(float(moved @ moved), 1e-300))
+    if number < FEWEST or minutes <= number:
         return None
     slopes = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
-    weight = np.where(lasting, power, 0.0)
-    mean = float(weight @ slopes / weight.sum())
-    scatter = float(weight @ np.square(slopes - mean)) / MEAN_INFLATION
-    p_value = max(float(f.sf(scatter / (number - 1), number - 1, DEGREES)), MINIMUM_P)
-    noise = np.where(lasting, MEAN_INFLATION / np.maximum(power, 1e-300), np.inf)
-    between = 1.0 / weights_between(slopes, noise, np.ones((len(slopes), 1)))[lasting] - noise[lasting]
-    relative = np.where(lasting, slopes / mean if mean else np.nan, np.nan)
-    error = np.where(lasting, np.sqrt(noise) / max(abs(mean), 1e-300), np.nan)
-    there = tuple(name for name, sure in zip(coarse.timeline.names, relative > SURE * error, strict=True) if sure)
-    spread = float(np.sqrt(max(between.mean(), 0.0))) / max(abs(mean), 1e-300)
-    return OwnSlopes(relative, error, p_value, spread, there)
+    left = np.bincount(coarse.cluster, path * (rows - slopes[coarse.drive] * path) * inside)
+    weight, slopes = power[lasting], slopes[lasting]
+    variance = max(float(left @ left) / float(weight.sum()) * minutes / (minutes - number), 1e-300)
+    mean, noise = float(weight @ slopes / weight.sum()), variance / weight
+    scatter = float(weight @ np.square(slopes - mean)) / variance
+    p_value = max(float(f.sf(scatter / (number - 1), number - 1, minutes - number)), MINIMUM_P)
+    between = max(float((1.0 / weights_between(slopes, noise, np.ones((number, 1))) - noise).mean()), 0.0)
+    sure = np.sign(mean) * slopes > float(norm.isf(SURE_LEVEL / number)) * np.sqrt(noise)
+    known = between / np.maximum(between + noise, 1e-300)  # share of its slope that a drive knows itself
+    likely, scale = mean + known * (slopes - mean), max(abs(mean), 1e-300)
+    size = float(likely[sure].mean()) if sure.any() else mean
+    error = float(np.sqrt(np.sum((known * noise)[sure]))) / max(int(sure.sum()), 1)
+    names = tuple(np.array(coarse.timeline.names)[lasting][sure].tolist())
+    return OwnSlopes(p_value, float(np.sqrt(between)) / scale, names, size / mean if mean else 0.0, error / scale)

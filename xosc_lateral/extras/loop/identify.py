@@ -49,11 +49,6 @@ class Usable:
     unused: Mapping[str, str]
     roles: Mapping[str, Assigned]
 
-    @property
-    def not_tested(self) -> dict[str, str]:
-        """Columns that are not tested as causes, and why."""
-        return {**self.unused, **dict.fromkeys((one.column for one in self.feedback), "a consequence of the movement")}
-
 
 @dataclass(frozen=True, eq=False)
 class Identified:

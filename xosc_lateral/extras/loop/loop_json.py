@@ -13,7 +13,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.loop.close import Finding, LoopResult
 from xosc_lateral.extras.loop.identify import held_out_words
-from xosc_lateral.extras.loop.loop_words import feedback_words, lack_of_fit_words, meaning
+from xosc_lateral.extras.loop.loop_words import feedback_words, meaning, verdict
 from xosc_lateral.extras.loop.selection import Gain
 from xosc_lateral.extras.loop.shown import Shown, between_drives_of
 from xosc_lateral.files.profiles import profile_hash
@@ -34,7 +34,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     own_errors = result.own_errors
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
-    left, scores, known = result.lack_of_fit, result.scores, result.explained
+    scores = result.scores
     return {
         "drives": list(result.coarse.timeline.names),
         "base_profile": _profile(result.base) | {"given": result.base_given, "in_sample": result.in_sample},
@@ -58,25 +58,14 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "own_error": own_errors and {"before": own_errors[0], "after": own_errors[1]},
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
-        "explained": known
-        and {
-            "share": known.share if known.is_known else None,
-            "interval": list(known.interval) if known.is_known else None,
-            **{"after_nat_per_block": known.after, "free_nat_per_block": known.free},
-        },
         "returned_base": result.identified.returned_base or None,
         "unexplained": {
-            "measure": "root of error after squared minus floor squared, m",
-            "size_m": left.unexplained,
-            "p_value": left.p_value,
-            "clear": left.is_clear,
-            "where": [group.name for group in left.where] if left.is_clear else [],
-            "sentence": lack_of_fit_words(result),
+            "sentence": verdict(result),
             "omnibus": result.remainder and asdict(result.remainder) | {"within_chance": result.remainder.silent},
         },
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
-            for group in left.groups
+            for group in result.lack_of_fit.groups
         ],
         "metrics": {
             when: {} if distances is None else dict(distances.by_metric)
@@ -107,6 +96,7 @@ def finding_record(finding: Finding) -> dict[str, Any]:
     return {name: getattr(finding, name) for name in FINDING_FIELDS} | {
         "columns": list(finding.columns),
         "between": finding.ends and {"from": dict(finding.ends.low), "to": dict(finding.ends.high)},
+        "drives": finding.own_slopes and list(finding.own_slopes.there),
         "measure": f"{finding.measure}, m",
         "alike": sorted({name for columns in finding.alike for name in columns} - set(finding.columns)),
         "instead": [list(columns) for columns in finding.alike],

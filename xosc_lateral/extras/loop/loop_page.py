@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from xosc_lateral.drivers.model.effects import ColumnEffect
-from xosc_lateral.extras.loop import loop_figures, loop_shown, loop_words
-from xosc_lateral.extras.loop.close import Finding, LoopResult
+from xosc_lateral.extras.loop import loop_figures, loop_words
+from xosc_lateral.extras.loop.close import LoopResult
 from xosc_lateral.extras.loop.held_out import SNIPPET_ROWS
 from xosc_lateral.extras.loop.identify import held_out_words
 from xosc_lateral.extras.loop.loop_json import column_record
@@ -22,84 +22,30 @@ LEFT_ROWS = 8  # Rows of the table of what is left.
 BAD_RATIO, GOOD_RATIO = 2.0, 1.2
 
 
-def loop_text(result: LoopResult) -> str:
-    """The outcome in a few lines; what is left is worked out unless it is given."""
-    lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
-    lines = lines or ["no effect added"]
-    lines += [
-        f"{loop_words.taken_back_words(one)}, p = {one.p_value:.1e}: {one.why}" for one in result.identified.taken_back
-    ]
-    unlike = [one for one in result.identified.selection.rejected if one.own_way]
-    lines += [f"{loop_words.taken_back_words(one)}: {one.why}" for one in unlike]
-    for item in result.identified.usable.feedback:
-        sure = "possibly a" if item.doubtful else "a"
-        lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
-    before, after, halves = (1000.0 * value for value in (result.error_before, result.error_after, result.floor))
-    if (own_errors := result.own_errors) is not None:
-        own_before, own_after = (1e3 * value for value in own_errors)
-        lines.append(f"where the effects act: held-out error {own_before:.1f} mm before, {own_after:.1f} mm after")
-    over = "over everything: " if result.own_errors else ""
-    ends = f"{before:.1f} mm before, {after:.1f} mm after ({halves:.1f} mm between halves of the drives)"
-    lines.append(f"{over}held-out error {ends}")
-    lines += [words for words in (loop_words.explained_words(result), loop_words.lack_of_fit_words(result)) if words]
-    return "\n".join(lines)
-
-
-def finding_sentence(finding: Finding) -> str:
-    """One finding in a line."""
-    when = ""
-    if finding.lag_s is not None:
-        early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
-        when = f", {early}, response time {finding.response_s:.1f} s"
-    alike = f"; {loop_words.others_words(finding)} would explain it about as well" if finding.alike else ""
-    size = "" if finding.kind == "memory" else f", {loop_words.size_words(finding)}"
-    return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
-
-
 def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
     """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
     timeline = result.coarse.timeline
     drives = timeline.names if len(timeline.names) <= NAMED_DRIVES else (f"{len(timeline.names)} drives",)
     page = Page(f"Closed loop: {', '.join(drives)}")
     page.lead(loop_words.outcome(result))
-    tone: Tone = "bad" if result.lack_of_fit.is_clear else "good" if result.findings else ""
-    own_errors = result.own_errors
-    figures = (
-        []
-        if own_errors is None
-        else [
-            KeyFigure(
-                f"{1e3 * own_errors[0]:.1f} mm", "before, where the effects act", "in the cells of what was found"
-            ),
-            KeyFigure(f"{1e3 * own_errors[1]:.1f} mm", "after, where the effects act", "in the same cells"),
-        ]
-    )
-    page.key_figures(
-        [
-            *figures,
-            KeyFigure(f"{1000 * result.error_before:.1f} mm", "error before", "of the base profile"),
-            KeyFigure(f"{1000 * result.error_after:.1f} mm", "error after", "of the refined profile", tone=tone),
-            KeyFigure(
-                f"{1000 * result.floor:.1f} mm", "between halves", "random halves of the drives against all of them"
-            ),
-        ]
-    )
-    page.lead(f"{loop_words.explained_words(result)} {loop_words.lack_of_fit_words(result)}".strip())
+    figures = [
+        KeyFigure(f"{one:.1f} → {two:.1f} mm", f"held-out error {what}")
+        for what, one, two in loop_words.errors_of(result)
+    ]
+    page.key_figures([*figures, KeyFigure(f"{1e3 * result.floor:.1f} mm", "between halves of these drives")])
+    page.lead(loop_words.verdict(result))
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
-    page.section("What these drives can show", loop_shown.SHOWN_NOTE)
-    page.table(loop_shown.shown_rows(result.shown))
+    page.section("What these drives can show", loop_words.SHOWN_NOTE)
+    page.table(loop_words.shown_rows(result.shown))
     page.section("Consequences of the car's own movement")
+    page.text(
+        "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel is. "
+        "They are not used as causes."
+    )
     feedback = result.identified.usable.feedback
-    if feedback:
-        page.text(
-            "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel "
-            "is. They are not used as causes."
-        )
-        page.table([{"column": item.column, "reason": loop_words.feedback_words(item)} for item in feedback])
-    else:
-        page.text("None.")
+    page.table([{"column": item.column, "reason": loop_words.feedback_words(item)} for item in feedback])
     page.section(
         "Tested and rejected",
         "The strongest candidate of each component that was not significant, and what was found and taken back.",
@@ -140,9 +86,9 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
 
 HOW_TO_READ = (
     "Offset: distance of the rear axle from the lane centre, positive to the left of travel.",
-    "Error: the root mean square of measured minus expected over all groups of statistics, on blocks that were used "
-    "neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of {n_runs} "
-    "simulated runs of the profile under the same context.",
+    "Error (before → after): the root mean square of measured minus expected over all groups of statistics, on blocks "
+    "that were used neither to choose nor to fit the base, the effects or their sizes. The expectation is the mean of "
+    "{n_runs} simulated runs of the profile under the same context.",
     "Between halves: the same difference between random halves of the measured blocks and all of them. At that size, "
     "no mean, spread or frequency band distinguishes the profile from the driver.",
     "p-value: how often a table without this effect would show one as strong. It is family-wise: all columns, lags "
@@ -173,21 +119,6 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
                 "bands: two standard errors. Held-out blocks: means by fifths of the effect.",
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
-    page.heading("All effects in numbers")
-    timed = any(finding.lag_s is not None for finding in result.findings)
-    page.table(
-        [
-            {"effect": finding.effect, "shape": finding.shape, "size": loop_words.size_words(finding)}
-            | ({"lag [s]": finding.lag_s, "response [s]": finding.response_s} if timed else {})
-            | {"p-value": finding.p_value}
-            | {"error before [mm]": 1000.0 * finding.error_before, "error after [mm]": 1000.0 * finding.error_after}
-            for finding in result.findings
-        ],
-        "Size ± two standard errors: the change from the 5 % to the 95 % quantile of the driving quantity, or an "
-        "amplitude. Errors are held-out errors of the statistic that shows the effect best.",
-        formats={"lag [s]": "+.1f", "response [s]": ".1f", "p-value": ".1e"}
-        | dict.fromkeys(("error before [mm]", "error after [mm]"), ".1f"),
-    )
     if proofs:
         caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
         page.table([{"in a scenario": one} for one in proofs], caption)

@@ -1,39 +1,34 @@
-"""A closed loop in plain words: what an effect means, how sure it is, what is left."""
+"""A closed loop in plain words: what was found, how sure it is, what is left, and what these drives could show."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Product
 from xosc_lateral.extras.loop.close import Finding, LoopResult
 from xosc_lateral.extras.loop.columns import FEEDBACK_BAND_HZ, FUNCTION_COHERENCE, Feedback
-from xosc_lateral.extras.loop.drives import OwnSlopes
-from xosc_lateral.extras.loop.ends import Ends
-from xosc_lateral.extras.loop.loop_shown import GAP, shown_words
 from xosc_lateral.extras.loop.omnibus import DELAYS
 from xosc_lateral.extras.loop.passage import Passage
 from xosc_lateral.extras.loop.selection import Rejected
+from xosc_lateral.extras.loop.shown import Shown
 from xosc_lateral.extras.loop.terms.time import CHANGE_WITH_TIME
 from xosc_lateral.extras.loop.timeline import LOCAL_S
-
-CERTAIN_P_VALUE = (
-    1e-4  # p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]
+from xosc_lateral.workflows.profiles.effect_words import (
+    GAP,
+    HINTS,
+    change_words,
+    elsewhere_words,
+    plain_unit,
+    side_of,
+    timing_words,
+    where_words,
 )
-NAMED_GROUPS = 4  # So many groups with the most left unexplained are named.
-SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
 
-# Signs that a reader of a figure has to know.
-HINTS: Mapping[str, str] = {
-    "curvature": "positive in left bends",
-    "crossfall": "positive: falls to the right",
-    "grade": "positive: rises ahead",
-    "lane_index": "0 is the rightmost lane",
-    "wind_direction": "90: blows to the left",
-}
+CERTAIN_P_VALUE = 1e-4  # p-values below this are extrapolated far beyond the null's sample: certain, no better known.
+SPREAD = f"spread within {LOCAL_S:g}{GAP}s"  # What the local standard deviation is called in figures.
 
 # What is asked of each component.
 COMPONENT_WORDS: Mapping[str, str] = {
@@ -57,11 +52,13 @@ _PLAIN_GROUPS: Mapping[str, str] = {
     "mean by effect: step 0": "mean before and after it",
 }
 
-FACTOR = f"factor{GAP}{{0:.2f}}{{1}}"
-# Of each kind of finding its size, with its error, and what it means where no column says so.
+# Of each kind of finding without a column its size, with its error, and what it means.
 KINDS: Mapping[str, tuple[str, str]] = {
     "location": (f"{{0:+.2f}}{{1}}{GAP}m", ""),
-    "scale": (FACTOR, "The spread about the mean position changes smoothly over the drive: fatigue, or learning."),
+    "scale": (
+        f"factor{GAP}{{0:.2f}}{{1}}",
+        "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
+    ),
     "periodic": (
         f"amplitude {{0:.2f}}{{1}}{GAP}m",
         "The car oscillates at a steady frequency, whatever the road and the traffic do.",
@@ -77,11 +74,11 @@ KINDS: Mapping[str, tuple[str, str]] = {
         "recalibrated camera, for example, or a change of driver.",
     ),
     "regime": (
-        FACTOR,
+        f"factor{GAP}{{0:.2f}}{{1}}",
         "The movement switches between two levels of spread, and no column predicts when: distraction, for example.",
     ),
     "memory": (
-        FACTOR,
+        f"factor{GAP}{{0:.2f}}{{1}}",
         "How the car moves depends on more than its position one step ago. The core model is replaced by "
         "`autoregressive`, which has a longer memory.",
     ),
@@ -91,12 +88,12 @@ KINDS: Mapping[str, tuple[str, str]] = {
         "for every vehicle.",
     ),
 }
+ANY_TIME = "The mean position changes with time, and the drives do not tell in which form."
 
 
 def column_label(column: str, *, hint: bool = True) -> str:
     """A column with its unit where that is known, and what its sign means, for axes."""
-    unit = CONTEXT_UNITS.get(column, "").replace("m/s2", "m/s²").replace("-", "")
-    sign = HINTS.get(column, "") if hint else ""
+    unit, sign = plain_unit(column), HINTS.get(column, "") if hint else ""
     return column + (f" [{unit}]" if unit else "") + (f" ({sign})" if sign else "")
 
 
@@ -105,51 +102,46 @@ def product_label(effect: Product) -> str:
     return " × ".join(str(factor) for factor in effect.factors)
 
 
+# ---- one finding ----
+def finding_sentence(finding: Finding) -> str:
+    """One finding in a line: what, how much, between which ends, when, of what shape, and what else it may be."""
+    when = "" if finding.lag_s is None else f"; {timing_words(finding.lag_s, finding.response_s or 0.0)}"
+    alike = f"; {others_words(finding)} would explain it about as well" if finding.alike else ""
+    return f"{finding.effect}: {size_words(finding)}{when}; {finding.shape}{alike}"
+
+
 def size_words(finding: Finding) -> str:
-    """Size with two standard errors and its unit, and between which ends it is."""
-    if finding.over_time and finding.passage is not None:
-        moment = float(finding.passage.time[finding.passage.at])
-        return f"{_does(finding)} {_moment(moment) if moment else 'as it begins'} in a typical passage"
-    return f"{_does(finding)} {_where(finding.ends)}" if finding.ends else _size(finding)
+    """What is different, with two standard errors, and between which ends it is."""
+    effect, ends = finding.effects[0] if finding.effects else None, finding.ends
+    if ends is None or not isinstance(effect, ColumnEffect):
+        about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
+        return KINDS[finding.kind][0].format(finding.size_m, about)
+    if finding.passage is not None and finding.over_time:
+        return _passage_words(finding.passage, finding.columns[0])
+    change, error = finding.size_m, finding.size_error
+    if effect.acts is not Acts.LOCATION:
+        change, error = np.log(change), error / change
+    words = f"{change_words(effect.acts, float(change), error)} {where_words(ends)}{elsewhere_words(effect.acts, ends)}"
+    slopes = finding.own_slopes
+    if slopes is None:
+        return words
+    where = f" in {', '.join(slopes.there)}" if slopes.there else ""
+    others = ", in the others less, nothing or the reverse" if slopes.there else ""
+    return f"{words}{where} (drives differ, p = {slopes.p_value:.1e}{others})"
 
 
-def _size(finding: Finding) -> str:
-    about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
-    return KINDS[finding.kind][0].format(finding.size_m, about)
-
-
-def _does(finding: Finding) -> str:
-    """What is different at the high end: to which side, or by which factor."""
-    if finding.kind != "location":
-        return _size(finding)
-    return f"{_size(finding).lstrip('+-')} further {_side(finding.size_m)}"
-
-
-def _side(shift: float) -> str:
-    return "left" if shift > 0 else "right"
-
-
-def _where(ends: Ends) -> str:
-    """From where to where a column goes, and where the other one stays."""
-    (column, low), *beside = ends.low.items()
-    high, unit = ends.high[column], CONTEXT_UNITS.get(column, "").replace("-", "")
-    if (low, high) == (0.0, 1.0):
-        words = f"while `{column}` is on"
-    elif np.isnan(low) and column in PLACES_BY_COLUMN:
-        words = f"{PLACES_BY_COLUMN[column]}, `{column}` {high:.3g} {unit}".rstrip()
-    else:
-        words = f"as `{column}` goes from {_value(low)} to {_value(high)} {unit}".rstrip()
-    words += f" ({HINTS[column]})" if column in HINTS else ""
-    return words + "".join(f" where `{name}` is {_value(value)}" for name, value in beside)
-
-
-def _value(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.3g}"
-
-
-def _moment(seconds: float) -> str:
-    """A moment of a passage, against where the column begins to change. [s]"""
-    return f"{abs(seconds):.0f}{GAP}s {'before' if seconds < 0 else 'after'} it begins"
+def _passage_words(passage: Passage, column: str) -> str:
+    """How far to either side the car goes in a typical passage, and when."""
+    sides: list[str] = []
+    for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest_shift[0]) * passage.path)))):
+        size, error, moment = float(passage.path[at]), 2.0 * float(passage.error[at]), float(passage.time[at])
+        if not sides or abs(size) > error:
+            when = f"{abs(moment):.0f}{GAP}s {'before' if moment < 0 else 'after'} it begins"
+            sides.append(f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m further {side_of(size)} {when}")
+    usual = f"{passage.usual:.3g}" if np.isfinite(passage.usual) else "none"
+    hint = f"; {HINTS[column]}" if column in HINTS else ""
+    goes = f"`{column}` from {usual} to {passage.high:.3g} {plain_unit(column)}".rstrip()
+    return f"{', '.join(sides)} in a typical passage ({goes} for {passage.lasts_s:.0f}{GAP}s{hint})"
 
 
 def p_value_words(p_value: float) -> str:
@@ -161,61 +153,31 @@ def p_value_words(p_value: float) -> str:
 
 def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
-    effect = finding.effects[0] if finding.effects else None
-    if isinstance(effect, ColumnEffect):
-        sentence = _column_sentence(finding, effect)
-    else:
-        change = "The mean position changes with time, and the drives do not tell in which form."
-        hidden = change if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
-        sentence = f"{hidden} ({finding.shape[0].upper()}{finding.shape[1:]}; {size_words(finding)}.)"
-    when = ""
-    if finding.lag_s is not None and finding.response_s is not None:
-        lag = finding.lag_s
-        start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s in advance" if lag < 0 else f"{lag:.1f} s later"
-        slow = f", with a response time of {finding.response_s:.1f} s" if finding.response_s > 0 else ""
-        when = f"The driver responds {start}{slow}."
-    elif finding.columns and not finding.over_time:
-        when = "What counts is the mean of each drive, not changes within a drive."
-    own = finding.own_slopes
-    words = [
-        sentence,
-        "" if own is None or not own.differ else _own_words(finding, own),
-        when,
-        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
-    ]
-    if finding.alike:
-        words.append(
-            f"{others_words(finding, '`')} would explain it about as well; these drives cannot tell which it is."
-        )
-    measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
-    change = f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now"
-    words.append(f"Error of the {measure} on held-out blocks: {change}.")
-    return " ".join(word for word in words if word)
+    hidden = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
+    usual = " What counts is the mean of each drive, not changes within a drive."
+    whole_drives = bool(finding.columns) and finding.lag_s is None and not finding.over_time
+    sentence = finding_sentence(finding)
+    return (
+        f"{'' if finding.columns else f'{hidden} '}{sentence[0].upper()}{sentence[1:]}.{usual if whole_drives else ''} "
+        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}). "
+        f"Error of the {_PLAIN_GROUPS.get(finding.statistic, finding.measure)} on held-out blocks: "
+        f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now."
+    )
 
 
-def _own_words(finding: Finding, own: OwnSlopes) -> str:
-    """In which drives it acts, and how much there."""
-    differs = f"It differs from drive to drive (p = {own.p_value:.1e})"
-    if not own.there:
-        return f"{differs}; in none alone it is sure."
-    there = replace(finding, size_m=finding.size_m * own.relative_there, size_error=0.0)
-    return f"{differs}: it surely acts in {', '.join(own.there)}, {_does(there)} there; in the others less, or not."
-
-
-def others_words(finding: Finding, mark: str = "") -> str:
-    """Columns of each other effect that explains as much, each name between marks; empty: there is none."""
+def others_words(finding: Finding) -> str:
+    """Columns of each other effect that explains as much; empty: there is none."""
     return ", or ".join(
-        " with ".join(f"{mark}{name}{mark}" for name in columns)
-        + (" alone" if set(columns) < set(finding.columns) else "")
+        " with ".join(f"`{name}`" for name in columns) + (" alone" if set(columns) < set(finding.columns) else "")
         for columns in finding.alike
     )
 
 
+# ---- what is none ----
 def feedback_words(item: Feedback) -> str:
     """Why a column is no cause, in a sentence."""
     if item.source:
-        by = "declared to be" if item.source == "declared" else "by its name"
-        return f"it is {by} the car's own movement"
+        return f"it is {'declared to be' if item.source == 'declared' else 'by its name'} the car's own movement"
     if item.function >= FUNCTION_COHERENCE:
         return f"it is a function of the present {item.of} (squared coherence {item.function:.2f}), as a warning is"
     above = f"above {FEEDBACK_BAND_HZ[0]:g}{GAP}Hz, where drivers hardly respond"
@@ -224,6 +186,34 @@ def feedback_words(item: Feedback) -> str:
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
     declare = f"; if it cannot, declare what it is: `--role {item.column}=road`" if item.doubtful else ""
     return f"{shared} {item.coherence:.2f}, and {share}: {verdict}{declare}"
+
+
+def taken_back_words(item: Rejected) -> str:
+    """What was found and is not kept, or what each drive does in its own way, and why."""
+    by = f" ({' and '.join(item.columns)})" if item.columns else ""
+    sure = f", p = {item.p_value:.1e}" if item.was_found else ""
+    return f"{COMPONENT_WORDS.get(item.component, item.component)}{by}{sure}: {item.why}"
+
+
+# ---- the whole ----
+def loop_text(result: LoopResult) -> str:
+    """The outcome in a few lines."""
+    lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
+    lines = lines or ["no effect added"]
+    rejected = result.identified.selection.rejected
+    lines += [taken_back_words(one) for one in rejected if one.was_found or one.own_way]
+    for item in result.identified.usable.feedback:
+        may = "may follow" if item.doubtful else "follows"
+        lines.append(f"{item.column}: {may} from the car's own movement, so it is not taken for a cause")
+    lines += [f"{what}: held-out error {one:.1f} mm before, {two:.1f} mm after" for what, one, two in errors_of(result)]
+    lines[-1] += f" ({1e3 * result.floor:.1f} mm between random halves of these drives and the whole)"
+    return "\n".join([*lines, verdict(result)])
+
+
+def errors_of(result: LoopResult) -> list[tuple[str, float, float]]:
+    """Held-out errors before and after, where the effects act and over everything, in words and mm."""
+    pairs = {"where the effects act": result.own_errors, "over everything": (result.error_before, result.error_after)}
+    return [(what, 1e3 * pair[0], 1e3 * pair[1]) for what, pair in pairs.items() if pair]
 
 
 def outcome(result: LoopResult) -> str:
@@ -236,73 +226,33 @@ def outcome(result: LoopResult) -> str:
     elif not back:
         words.append("No significant effect was found, and none was added.")
     if back:
-        names = "; ".join(f"{taken_back_words(item)}, p = {item.p_value:.1e}: {item.why}" for item in back)
         number = f"{len(back)} {'more ' * bool(findings)}" + ("effects were" if len(back) > 1 else "effect was")
-        words.append(f"{number} found and taken back ({names}).")
+        words.append(f"{number} found and taken back ({'; '.join(map(taken_back_words, back))}).")
         words += [] if findings else ["Nothing was added: the base profile is returned."]
     return " ".join(words)
 
 
-def taken_back_words(item: Rejected) -> str:
-    """What was found and is not kept."""
-    by = f" ({' and '.join(item.columns)})" if item.columns else ""
-    return f"{COMPONENT_WORDS.get(item.component, item.component)}{by}"
-
-
-def lack_of_fit_words(result: LoopResult) -> str:
-    """What is left unexplained, in a sentence."""
-    left = result.lack_of_fit
-    if left.unexplained == 0.0:
-        total = "Taken together, the residuals do not exceed the difference between halves of the drives."
-        return f"{total} {_remainder_words(result)}"
-    if not left.is_clear:
-        share = f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
-        return f"The error after is above that between halves, but {share} {_remainder_words(result)}"
-    where = ", ".join(
-        f"{group_words(group.name, result)} ({_mm(group.after)}, between halves {_mm(group.floor)})"
-        for group in left.where[:NAMED_GROUPS]
-    )
-    return (
-        f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
-        f"clearly above that between halves ({_mm(result.floor)}), and no effect in the profile explains the rest."
-        + (f" It stands out in: {where}." if where else "")
-        + ("" if result.remainder is None or result.remainder.silent else f" {_remainder_words(result)}")
-    )
-
-
-def explained_words(result: LoopResult) -> str:
-    """Share of the explainable, in a sentence; empty where nothing can be held out."""
-    known = result.explained
-    if known is None:
-        return ""
-    if not known.is_known:
-        return "On held-out blocks no free linear response to the columns predicts the mean better than the base."
-    share, low, high = (f"{100.0 * max(one, 0.0):.0f}" for one in (known.share, *known.interval))
-    return (
-        f"On held-out blocks, chosen and fitted without them, the effects explain {share}{GAP}% (95{GAP}% interval "
-        f"{low} to {high}{GAP}%) of what a free linear response to all columns explains of the mean."
-    )
-
-
-def _remainder_words(result: LoopResult) -> str:
-    """Whether any column predicts what is left, at whichever delay."""
-    left, back = result.remainder, result.identified.taken_back
+def verdict(result: LoopResult) -> str:
+    """What is left: whether any column predicts it, what no table says, and what would have been found."""
+    left = result.remainder
+    named = sorted({column for finding in result.findings for column in finding.columns})
     if left is None:
-        return f"Whether a column predicts what is left is not known: the check failed. {shown_words(result.shown)}"
-    delays = f"from {-DELAYS[0]:g} s ahead to {DELAYS[-1]:g} s behind"
-    if not left.silent:
-        return (
-            f"More is left than chance: `{' and '.join(left.columns)}`, at delays {delays}, explains "
-            f"{100 * left.share:.1f}{GAP}% of the movement's innovations (p = {left.p_value:.1e})."
+        words = "Whether a column predicts what is left is not known: the check failed."
+    elif not left.columns:
+        words = "The table has no other column that could explain what is left."
+    else:
+        delays = f"from {-DELAYS[0]:g} s ahead to {DELAYS[-1]:g} s later"
+        most = f"`{' and '.join(left.columns)}`, {delays}, explains {100 * left.share:.1f}{GAP}% of what is left"
+        words = (
+            f"What is left is no more than chance: no column predicts it, {delays} (p = {left.p_value:.2f})."
+            if left.silent
+            else f"More is left than chance: {most} (p = {left.p_value:.1e})."
         )
-    if back:
-        return f"No column predicts what is left (p = {left.p_value:.2f}). {shown_words(result.shown)}"
-    if not left.columns:
-        return f"There is no column that could explain what the profile still misses. {shown_words(result.shown)}"
-    return (
-        f"No column, at any delay {delays}, predicts what is left (p = {left.p_value:.2f}): it is within chance. "
-        f"{shown_words(result.shown)}"
+    alike = (
+        f"a cause that comes and goes with {' or '.join(f'`{one}`' for one in named)} looks the same" if named else ""
     )
+    unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
+    return f"{words} {unseen} {shown_words(result.shown)}"
 
 
 def group_words(name: str, result: LoopResult) -> str:
@@ -314,60 +264,51 @@ def group_words(name: str, result: LoopResult) -> str:
     return _PLAIN_GROUPS.get(name, name)
 
 
-# Where a driver is, by the column that says so.
-PLACES_BY_COLUMN: Mapping[str, str] = {
-    "left_distance": "beside vehicles on his left",
-    "right_distance": "beside vehicles on his right",
-    "car_left": "beside cars on his left",
-    "car_right": "beside cars on his right",
-    "truck_left": "beside trucks on his left",
-    "truck_right": "beside trucks on his right",
-    "left_is_truck": "when the next vehicle on his left is a truck",
-    "right_is_truck": "when the next vehicle on his right is a truck",
-    "lead_distance": "behind a vehicle ahead",
-    "lead_is_truck": "when the vehicle ahead is a truck",
-    "oncoming_distance": "when somebody comes towards him",
-}
-
-
-def _passage_sentence(passage: Passage, column: str) -> str:
-    """How far to either side the car goes in a typical passage, and when."""
-    sides: list[str] = []
-    for at in dict.fromkeys((passage.at, int(np.argmax(-np.sign(passage.largest_shift[0]) * passage.path)))):
-        size, error = float(passage.path[at]), 2.0 * float(passage.error[at])
-        if not sides or abs(size) > error:
-            moment = _moment(float(passage.time[at]))
-            sides.append(f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m to the {_side(size)} {moment}")
-    unit = CONTEXT_UNITS.get(column, "").replace("-", "")
-    rises = f"from {passage.usual:.3g} to" if np.isfinite(passage.usual) else "from none to"
-    hint = f"; {HINTS[column]}" if column in HINTS else ""
-    typical = f"`{column}` {rises} {passage.high:.3g}{GAP}{unit}".rstrip() + f" for {passage.lasts_s:.0f}{GAP}s{hint}"
-    return f"In a typical passage ({typical}) the car is farthest out {', and '.join(sides)}."
-
-
-def _column_sentence(finding: Finding, effect: ColumnEffect) -> str:
-    if finding.over_time and finding.passage is not None:
-        return _passage_sentence(finding.passage, effect.columns[0])
-    ends, does = (
-        finding.ends,
-        {
-            Acts.LOCATION: f"the car drives {_does(finding)}",
-            Acts.SPREAD: f"the movement about the mean changes by a {_size(finding)}",
-            Acts.FINE: f"the fine noise changes by a {_size(finding)}",
-            Acts.RATE: f"the rate of mean reversion changes by a {_size(finding)}",
-        },
-    )
-    assert ends is not None
-    words = f"{_where(ends)}, {does[effect.acts]}"
-    if ends.other:
-        (_, (name, value)) = ends.other.items()
-        change = ends.elsewhere if effect.acts is Acts.LOCATION else float(np.exp(ends.elsewhere))
-        there = replace(finding, size_m=change, size_error=0.0)
-        words += (
-            f"; where `{name}` is {_value(value)}, {_does(there) if abs(ends.elsewhere) > ends.error else 'nothing'}"
-        )
-    return f"{words[0].upper()}{words[1:]}."
-
-
 def _mm(value: float) -> str:
     return f"{1000.0 * value:.0f}{GAP}mm"
+
+
+# ---- what drives can show ----
+SHOWN_NOTE = (
+    "Smallest: an effect of this size is found with 80 % probability. At most: what was not found is smaller, with "
+    "95 %. Sizes are changes of the mean between the 5 % and 95 % quantile of what drives it, or factors of the "
+    "spread, of time over the longest drive. More minutes: of such driving, until 0.1 m or a factor of 1.5 is found as "
+    "often."
+)
+
+
+def shown_rows(shown: Sequence[Shown]) -> list[dict[str, str | None]]:
+    """What drives can show, as a table in words."""
+
+    def size(entry: Shown, value: float | None) -> str | None:
+        return None if value is None else f"{value:.2f}{GAP}m" if entry.acts == "mean" else f"factor{GAP}{value:.2f}"
+
+    return [
+        {
+            **{"look": entry.what, "on": entry.acts, "tested": "yes" if entry.tested else "no", "outcome": entry.why},
+            **{"smallest": size(entry, entry.smallest), "at most": size(entry, entry.bound)},
+            "more minutes": None if entry.more_minutes is None else f"{entry.more_minutes:.0f}",
+        }
+        for entry in shown
+    ]
+
+
+def shown_text(shown: Sequence[Shown]) -> str:
+    """The same for a terminal."""
+    rows = shown_rows(shown)
+    names = list(rows[0]) if rows else []
+    lines = aligned([names, *([row[name] or "-" for name in names] for row in rows)])
+    return "\n".join([shown_words(shown), "", *lines, "", SHOWN_NOTE])
+
+
+def shown_words(shown: Sequence[Shown]) -> str:
+    """What silence means here, in a sentence."""
+    forms = {"mean": f"of the mean by {{0:.2f}}{GAP}m", "spread": "of the spread by a factor of {0:.1f}"}
+    words = []
+    for acts, form in forms.items():
+        sizes = sorted(one.smallest for one in shown if one.acts == acts and one.smallest is not None)
+        words += [form.format(sizes[len(sizes) // 2])] if sizes else []
+    if not words:
+        return "In these drives no effect of a column would be found."
+    changes = " or ".join(words)
+    return f"Four of five changes {changes} would be found in these drives (median over columns; each in the report)."

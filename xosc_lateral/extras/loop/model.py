@@ -23,10 +23,10 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.model.effects import Acts, Effect
+from xosc_lateral.drivers.model.effects.ends import Ends
 from xosc_lateral.extras.loop.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.drives import OwnSlopes
-from xosc_lateral.extras.loop.ends import Ends
 from xosc_lateral.extras.loop.passage import Passage
 from xosc_lateral.extras.loop.refinement import Alternatives
 from xosc_lateral.extras.loop.timeline import CLUSTER_S, Coarse, on_fine_grid
@@ -77,7 +77,7 @@ class Description:
     lag_s: float | None = None
     response_s: float | None = None
     ends: Ends | None = None  # Of its columns, between which the size is.
-    own_slopes: OwnSlopes | None = None  # How it differs from drive to drive.
+    own_slopes: OwnSlopes | None = None  # How it differs from drive to drive; None: it does not, that one could tell.
     passage: Passage | None = None  # The path through a typical bend, say.
 
 

@@ -1,26 +1,22 @@
-"""What columns can explain of the mean by any course over time: of what is left after the search, and at all.
+"""What columns can explain of the mean that is left after the search, by any course over time.
 
 The check regresses what the refined profile leaves of the drives, white, on every column's distributed lag [1]_ in
-turn; it asks for the mean alone, not for the spread. The share of the explainable sets what the effects predict of
-blocks that nothing was chosen or fitted on against a free linear response: every column's course at once, each column's
-weights shrunk by the variance under which they are likeliest [3]_. It names nothing.
+turn; it asks for the mean alone, not for the spread.
 
 References
 ----------
 .. [1] A. Gasparrini, B. Armstrong, M. G. Kenward, "Distributed lag non-linear models", Statistics in Medicine 29, 2010.
 .. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
-.. [3] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992: groups' variances by evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.drivers.model.seeds import generator
 from xosc_lateral.extras.loop.autocorrelation import Whitener, positions_in_run
 from xosc_lateral.extras.loop.candidates import Family
@@ -34,7 +30,6 @@ from xosc_lateral.extras.loop.dictionary import (
 )
 from xosc_lateral.extras.loop.model import Fitted
 from xosc_lateral.extras.loop.significance import NULL_DRAWS, LoopSeed, as_one_degree, draw_null, upper_tail
-from xosc_lateral.extras.loop.timeline import Coarse
 
 # Delays between which a course over time is linear: from what a driver sees ahead to where a bend has long ended. [s]
 DELAYS = (-5.0, -3.0, -1.0, 1.0, 3.0, 6.0, 9.0, 12.0, 15.0)
@@ -130,88 +125,3 @@ def _beside_loud_rows(basis: FloatArray, rows: FloatArray) -> float:
     left = rows - basis @ scores
     weighed = basis * of_unit_variance(left)[:, None]
     return min(float(scores @ scores), float(scores @ np.linalg.pinv(weighed.T @ weighed) @ scores))
-
-
-ROUNDS = 30  # Of variances and weights by turns.
-VARIANCE_LIMITS = (1e-6, 1e3)  # Within which a column's variance is kept, for whitened rows of variance 1. [-]
-
-
-@dataclass(frozen=True, slots=True)
-class Explained:
-    """Gains of the mean in log score over the base, per held-out block. [nat]"""
-
-    after: float  # Of the effects that each fold found.
-    free: float  # Of the free linear response.
-    free_error: float  # Standard error of it.
-    share: float  # The one over the other. [-]
-    error: float  # Standard error of the share. [-]
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the share. [-]"""
-        return self.share - NORMAL_95 * self.error, self.share + NORMAL_95 * self.error
-
-    @property
-    def is_known(self) -> bool:
-        """Whether there is anything to explain: the free response surely gains."""
-        return self.free > NORMAL_95 * self.free_error
-
-
-def explained_share(
-    starts: Sequence[Fitted], finals: Sequence[Fitted], quantities: Quantities, coarse: Coarse, blocks: IntArray
-) -> Explained | None:
-    """What each fold's effects and free response predict of rows not fitted on; None: nothing is held out."""
-    # all columns' plain shapes at all delays, such that smooth weights are white
-    root = np.linalg.cholesky(SMOOTH_COVARIANCE)
-    plain = [
-        tents(values.astype(np.float64), quantities.drive) @ root
-        for candidate, values in zip(quantities.candidates, quantities.values, strict=True)
-        if candidate.family is Family.PLAIN
-    ]
-    if len(finals) < 2 or not plain:
-        return None
-    courses, gains = np.concatenate(plain, axis=1), np.zeros((2, len(blocks)))
-    for fold, (start, final) in enumerate(zip(starts, finals, strict=True)):
-        held = (blocks % len(finals) == fold) & coarse.valid
-        there = Whitener(final.whitener.process, held, final.whitener.drive, final.whitener.scale)
-        free = courses @ _free_weights(courses, start, final.whitener)
-        left = (final.coarse.offset - path for path in (_path(start), _path(final), _path(start) + free))
-        # levels are the held rows' own
-        before, *better = (np.square(there.rows(np.where(held, values, 0.0))) * held for values in left)
-        gains += 0.5 * (before - np.asarray(better)) / max(float(before[held].mean()) if held.any() else 1.0, 1e-300)
-    numbers = np.unique(blocks[coarse.valid])
-    by_effects, by_columns = (np.bincount(blocks, rows)[numbers] for rows in gains)
-    number, total = len(numbers), float(by_columns.sum())
-    share = float(by_effects.sum()) / total if total else 0.0
-    scatter = float(np.sqrt(number / max(number - 1, 1) * np.sum(np.square(by_effects - share * by_columns))))
-    error = float(np.std(by_columns, ddof=1) / np.sqrt(number)) if number > 1 else np.inf
-    share_error = scatter / max(abs(total), 1e-300)
-    return Explained(float(by_effects.mean()), float(by_columns.mean()), error, share, share_error)
-
-
-def _path(fitted: Fitted) -> FloatArray:
-    """Mean by the terms that say where a car is on rows that they were not fitted on, shape (n,). [m]"""
-    paths = [fitted.path(term) for term in fitted.terms if term.seen_held_out]
-    return np.asarray(np.sum([np.zeros(len(fitted.coarse)), *paths], axis=0))
-
-
-def _free_weights(courses: FloatArray, start: Fitted, whitener: Whitener) -> FloatArray:
-    """Weights of the free response, shape (columns * delays,), from the rows that a fold is fitted on. [m]"""
-    valid = whitener.valid
-    known = orthonormal(whitener.rows(start.columns)[valid])
-    rows = beside(known, whitener.rows(start.coarse.offset - start.columns @ start.sizes)[valid])
-    noise = max(float(np.sqrt(np.mean(rows**2))), 1e-300)
-    design = beside(known, whitener.rows(courses)[valid])
-    gram, products = design.T @ design, design.T @ (rows / noise)
-    size = len(DELAYS)
-    variance = np.full(len(products) // size, 1.0 / max(float(np.trace(gram)), 1e-300))
-    scale = 1.0 / max(float(np.trace(gram)) / len(products), 1e-300)
-    weights = np.zeros(len(products))
-    for _ in range(ROUNDS):
-        inverse = np.linalg.inv(gram + np.diag(np.repeat(1.0 / variance, size)))
-        weights = inverse @ products
-        left = np.diag(inverse).reshape(-1, size).sum(axis=1)
-        known_part = size - left / variance  # of its weights, how many the rows know
-        variance = np.square(weights).reshape(-1, size).sum(axis=1) / np.maximum(known_part, 1e-9)
-        variance = np.clip(variance, scale * VARIANCE_LIMITS[0], scale * VARIANCE_LIMITS[1])
-    return np.asarray(weights * noise)

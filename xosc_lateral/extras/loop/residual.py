@@ -40,8 +40,6 @@ FEW_RUNS, MANY_DRIVES = 6, 50  # ... and how many with so many drives, each of w
 HALF_SAMPLES = 64  # Of the blocks: the standard error of a share of 5 % of them is 3 %.
 TIME_PARTS = 6  # Parts of a drive by which the spread over time is compared: seven minutes of forty.
 LEVEL = 0.05  # Share of them that may be as far off as the refined profile. [-]
-# A group of summary statistics so many times its own sampling error is named when something is left. [-]
-STANDS_OUT = 2.0
 SPARE_ROWS = 75  # A bin with fewer rows (15 s) than this is left out. [-]
 
 
@@ -184,29 +182,16 @@ class GroupError:
     @property
     def unexplained(self) -> float:
         """What is left beyond the sampling error. [m]"""
-        return _beyond(self.after, self.floor)
+        return float(np.sqrt(max(self.after**2 - self.floor**2, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left beside the sampling error of what is measured [m], and the share of half samples as far off."""
+    """What is left beside the sampling error of what is measured: by statistic, by group, and over all. [m]"""
 
     floors: Mapping[str, FloatArray]
     groups: tuple[GroupError, ...]
     floor: float
-    unexplained: float
-    p_value: float
-
-    @property
-    def is_clear(self) -> bool:
-        """Whether more is left than chance explains."""
-        return self.unexplained > 0.0 and self.p_value <= LEVEL
-
-    @property
-    def where(self) -> tuple[GroupError, ...]:
-        """Groups that stand out, the largest first."""
-        standing = [group for group in self.groups if group.after > STANDS_OUT * group.floor]
-        return tuple(sorted(standing, key=lambda group: -group.unexplained))
 
 
 def lack_of_fit_of(
@@ -226,14 +211,7 @@ def lack_of_fit_of(
         )
         for name, values in real.items()
     )
-    sizes, error = np.array([size_of(half) for half in halves]), error_between(real, after)
-    p_value = float(1.0 + np.sum(sizes >= error)) / (1.0 + len(sizes))
-    floor = float(sizes.mean())
-    return LackOfFit(floors, groups, floor, _beyond(error, floor), p_value)
-
-
-def _beyond(error: float, floor: float) -> float:
-    return float(np.sqrt(max(error**2 - floor**2, 0.0)))
+    return LackOfFit(floors, groups, float(np.mean([size_of(half) for half in halves])))
 
 
 def _mean_of_finite(values: FloatArray) -> FloatArray:

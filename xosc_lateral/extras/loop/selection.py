@@ -94,6 +94,7 @@ class Rejected:
     why: str
     was_found: bool = False
     own_way: bool = False
+    term: Term | None = None  # Of what a product stands for: it comes back where the product goes.
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,18 +107,27 @@ class Selection:
     final: Fitted
 
     def without(self, terms: Sequence[Term], why: str) -> Selection:
-        """Less some accepted terms, fitted again."""
+        """Less some accepted terms, fitted again; what only a product that goes stood for comes back."""
         if not terms:
             return self
         gone = {id(term) for term in terms}
         out = [one for one in self.accepted if id(one.term) in gone]
-        taken_back = (Rejected(one.term.component, one.term.columns, one.p_value, why, was_found=True) for one in out)
-        return Selection(
-            tuple(one for one in self.accepted if one not in out),
-            (*self.rejected, *taken_back),
-            self.start,
-            fit_model(self.final.coarse, [term for term in self.final.terms if id(term) not in gone]),
-        )
+        left = [one for one in self.accepted if one not in out]
+        products = [{frozenset(one.term.columns) for one in some} for some in (out, left)]
+        back = {
+            one: Accepted(one.term, one.p_value)
+            for one in self.rejected
+            if one.term is not None
+            and [any(set(one.columns) < columns for columns in some) for some in products] == [True, False]
+        }
+        rejected = [one for one in self.rejected if one not in back]
+        rejected += [
+            Rejected(*about, was_found=True, term=one.term if why == BY_PRODUCT else None)
+            for one in out
+            for about in [(one.term.component, one.term.columns, one.p_value, why)]
+        ]
+        fitted = [term for term in self.final.terms if id(term) not in gone] + [one.term for one in back.values()]
+        return Selection((*left, *back.values()), tuple(rejected), self.start, fit_model(self.final.coarse, fitted))
 
 
 def select(search: Search, initial: Sequence[Term] = ()) -> Selection:

@@ -107,7 +107,8 @@ def missing_throughout(values: FloatArray, timeline: Timeline) -> BoolArray:
 
 def unsized(effect: ColumnEffect) -> ColumnEffect:
     """The same effect before it was fitted."""
-    return structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=())
+    fitted = dict.fromkeys(("coefficients", "errors", "reference", "between_drivers", "response_range", "driven"), ())
+    return structs.replace(effect, **fitted)
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
@@ -270,16 +271,6 @@ class Coarse:
         quantity = timeline.held(effect.known(self.context), effect.episode)
         response = timeline.respond(quantity, effect.lag_s, effect.response_s)
         return response if not course else np.sum([w * timeline.shifted(response, late) for late, w in course], axis=0)
-
-    def settled(self, effect: ColumnEffect, held: Mapping[str, float]) -> FloatArray:
-        """The response, within bounds, while its columns stay at the values `held`, shape (k,). [own unit]"""
-        quantity = effect.known({name: np.full(1, value) for name, value in held.items()})[0]
-        if effect.episode:
-            quantity = np.where(np.abs(quantity) >= effect.episode, quantity, 0.0)
-        settled = quantity * (sum(weight for _, weight in effect.course) if effect.course else 1.0)
-        if effect.response_range:
-            settled = np.clip(settled, *np.asarray(effect.response_range).T)
-        return np.asarray(settled, dtype=np.float64)
 
     def strength(self, effect: ColumnEffect) -> FloatArray:
         """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""

@@ -14,20 +14,12 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.files.pages.page import KeyFigure, Page, format_value
+from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.files.profiles import FIELDS, Entry, facts_of, profile_hash
-
-TARGET_WORDS: Mapping[Acts, str] = {
-    Acts.LOCATION: "mean offset",
-    Acts.SPREAD: "spread",
-    Acts.RATE: "rate of mean reversion",
-    Acts.FINE: "fine noise",
-}
-"""What a column effect changes, in words."""
+from xosc_lateral.workflows.profiles.effect_words import effect_line
 
 SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
@@ -147,18 +139,6 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         *_outcome(known),
     ]
     return [(label, words) for label, words in rows if words]
-
-
-def effect_line(effect: Effect) -> str:
-    """An effect in a line: what it changes, by which columns, of what shape; a hidden one by its parameters."""
-    if isinstance(effect, ColumnEffect):
-        lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
-        response = f", response time {effect.response_time:g} s" if effect.response_time else ""
-        course = ", a course over time" if effect.course else ""
-        return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response}{course})"
-    plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
-    kind = str(plain.pop("kind")).replace("-", " ")
-    return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
 
 
 def _side(keeping: LaneKeeping) -> str:

@@ -20,6 +20,7 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
+from xosc_lateral.workflows.profiles.effect_words import effect_line
 
 SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
 PATH_SPACING = 0.8  # Between the zero lines of two sample paths. [m]
@@ -101,14 +102,6 @@ def _row(each: ComparedProfile) -> dict[str, str]:
     }
 
 
-def _effects(each: ComparedProfile) -> list[str]:
-    words = []
-    for values in each.profile.to_dict()["effects"]:
-        columns = values.get("column") or "*".join(factor["column"] for factor in values.get("factors", ()))
-        words.append(f"{columns} ({values['kind']})" if columns else str(values["kind"]))
-    return words
-
-
 def comparison_record(compared: Compared) -> dict[str, Any]:
     """The same as plain values."""
     return {
@@ -118,7 +111,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "sha256": profile_hash(each.profile),
                 "model": each.profile.model.kind,
                 **figures_record(each.summary, each.keeping),
-                "effects": _effects(each),
+                "effects": [effect_line(effect) for effect in each.profile.effects],
             }
             for each in compared.profiles
         ],

@@ -9,7 +9,7 @@ from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.extras.loop.held_out import removal_of
 from xosc_lateral.extras.loop.model import fit_model
-from xosc_lateral.extras.loop.terms.column import columns_on_size, of_kind, on_path, shrunk, span
+from xosc_lateral.extras.loop.terms.column import columns_on_size, of_kind, shrunk
 from xosc_lateral.extras.loop.terms.mean import MeanTerm
 from xosc_lateral.extras.loop.terms.spread import SpreadTerm
 from xosc_lateral.extras.loop.terms.time import StepTerm, TimeSpreadTerm
@@ -121,16 +121,3 @@ def test_terms_of_one_component_are_numbered_and_what_they_did_adds_up(coarse: C
     parts = [effects[0].strength(0.2, coarse.context) for key, (_, effects) in estimates.items() if "mean" in key]
     np.testing.assert_allclose(removal[Acts.LOCATION], parts[0] + parts[1], atol=1e-15)  # type: ignore[operator]
     np.testing.assert_array_equal(removal[Acts.SPREAD], estimates["spread 0"][1][0].strength(0.2, coarse.context))
-
-
-@pytest.mark.parametrize(("every", "lasts"), [(100, 10), (1000, 10)], ids=["often", "seldom"])
-def test_a_size_is_what_the_path_reaches_however_seldom(every: int, lasts: int) -> None:
-    """Gusts of two seconds, which a driver of four seconds answers by less than a half."""
-    gusts = (np.arange(4500) % every < lasts).astype(float)
-    coarse = coarse_of(movement(np.random.default_rng(83), SECONDS), {"gust": gusts})
-    effect = Linear(
-        acts=Acts.LOCATION, column="gust", coefficients=(0.4,), errors=(0.05,), reference=(0.0,), response_s=4.0
-    )
-    assert span(coarse, effect) == pytest.approx(0.4)
-    reached = 0.4 * (1.0 - np.exp(-lasts * 0.2 / 4.0))
-    assert on_path(coarse, effect) == pytest.approx(reached, rel=0.15)

@@ -111,6 +111,8 @@ def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
 # ---- effects of context columns ----
 MAX_ORDER = 9
 """More lags in a row are a delay. [-]"""
+MOST_DRIVEN = 32
+"""Values of a column between which the size of an effect is told, at most. [-]"""
 
 
 class ColumnEffect(Effect, frozen=True, kw_only=True):
@@ -121,7 +123,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     deviation is negative, or the order is not 1 to 9.
     """
 
-    later = ("between_drivers", "response_range", "response_order", "course", "episode")
+    later = ("between_drivers", "response_range", "response_order", "course", "episode", "driven")
 
     # For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ...
     words: ClassVar[str] = ""
@@ -146,6 +148,9 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     # Size of the quantity beyond which its peak is held until the next time: the last bend, the last vehicle overtaken.
     # 0: nothing is held. [unit of the quantity]
     episode: float = 0.0
+    # Values of each column, rising, from 5 % to 95 % of the time that the effect was fitted on, None: there is none.
+    # Between these its size is told. Empty: not known. [unit of the column]
+    driven: tuple[tuple[float | None, ...], ...] = ()
 
     def __post_init__(self) -> None:
         tuples = ("coefficients", "errors", "reference", "between_drivers")
@@ -185,6 +190,15 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         ):
             raise DriverProfileError(
                 f"effect {self.kind}: answer_range {ranges}, expected none or (lowest, highest) for each coefficient"
+            )
+
+        if self.driven and (
+            len(self.driven) != len(self.columns)
+            or not all(1 <= len(values) <= MOST_DRIVEN for values in self.driven)
+            or not all(value is None or np.isfinite(value) for values in self.driven for value in values)
+        ):
+            raise DriverProfileError(
+                f"effect {self.kind}: driven {self.driven}, expected none or 1 to {MOST_DRIVEN} numbers for each column"
             )
 
     @property
@@ -250,6 +264,14 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         known, order = self.known(context), self.response_order
         timing = (known, step, self.lag_s, self.response_s)
         return respond(*timing, order=order, course=self.course, episode=self.episode)
+
+    def settled(self, held: Mapping[str, FloatArray]) -> FloatArray:
+        """The response, within bounds, while columns stay at values, shape (n,) each, NaN: none; shape (n, k)."""
+        quantity = self.known(held)
+        if self.episode:
+            quantity = np.where(np.abs(quantity) >= self.episode, quantity, 0.0)
+        settled = quantity * (sum(weight for _, weight in self.course) if self.course else 1.0)
+        return np.clip(settled, *np.asarray(self.response_range).T) if self.response_range else settled
 
     def response_in_blocks(self, step: float, state: ResponseState | None = None, *, delay: int = 0) -> Response:
         """The response block by block, shape (n, k) each, from the start of a drive or from a state.

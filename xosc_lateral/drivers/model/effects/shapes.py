@@ -78,6 +78,12 @@ class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
     scale: float
 
     @property
+    def shape(self) -> str:
+        """Word for the report; of a held one the side of its peak counts."""
+        beyond = self.scale * float(np.arctanh(min(self.episode, 1.0 - 1e-9)))
+        return f"side of the last peak beyond {beyond:.3g}, held until the next" if self.episode else super().shape
+
+    @property
     def levels_off(self) -> bool:
         """At both ends."""
         return True

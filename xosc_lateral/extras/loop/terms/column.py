@@ -11,10 +11,15 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.extras.loop.ends import DRIVING_QUANTILES, ends_of
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop.model import Description, Fitted, Term, proper
 from xosc_lateral.extras.loop.refinement import Alternatives
 from xosc_lateral.extras.loop.timeline import Coarse
+
+DRIVING_QUANTILES = (0.05, 0.95)  # Of a column in these drives: its ends. [-]
+GRID = 19  # Quantiles between them at which an effect may be strongest. [-]
+SHARE_WITHOUT = 0.05  # Of the time without anybody from which "none" is an end of a column. [-]
+FEW_VALUES = 12  # Different values up to which each is looked at. [-]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +54,8 @@ class ColumnTerm(Term):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between the ends of its column."""
         effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
-        on_mean, ends = effect.acts is Acts.LOCATION, ends_of(fitted.coarse, effect)
+        on_mean, ends = effect.acts is Acts.LOCATION, ends_of(effect)
+        assert ends is not None
         size = ends.change if on_mean else float(np.exp(ends.change))
         return Description(
             effect=f"{self.what} by {' and '.join(effect.columns)}",
@@ -90,7 +96,25 @@ class ColumnTerm(Term):
             errors=tuple(errors),
             reference=tuple(within.mean(axis=0)),
             response_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
+            driven=driven_values(coarse, self.columns),
         )
+
+
+def driven_values(coarse: Coarse, columns: Sequence[str]) -> tuple[tuple[float | None, ...], ...]:
+    """Values of columns between their ends, rising, behind None where there often is none. [unit of the column]"""
+    driven: list[tuple[float | None, ...]] = []
+    for name in columns:
+        values = coarse.context[name][coarse.timeline.valid]
+        seen = values[np.isfinite(values)]
+        levels = np.unique(seen)
+        grid = (
+            np.unique(np.quantile(seen, np.linspace(*DRIVING_QUANTILES, GRID), method="nearest")) if len(seen) else seen
+        )
+        if len(levels) <= FEW_VALUES or len(grid) == 1:  # a switch, however rarely it is on
+            grid = levels if len(levels) <= FEW_VALUES else levels[[0, -1]]
+        often_none = len(seen) < (1.0 - SHARE_WITHOUT) * len(values)
+        driven.append((*([None] if often_none or not len(seen) else []), *grid.tolist()))
+    return tuple(driven)
 
 
 def shrunk(sizes: FloatArray, errors: FloatArray) -> FloatArray:

@@ -20,6 +20,7 @@ from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Effect, Product, Proximity
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.drivers.model.effects.shapes import SingleColumnEffect
 from xosc_lateral.extras.loop import refinement
 from xosc_lateral.extras.loop.autocorrelation import Problem
@@ -28,12 +29,11 @@ from xosc_lateral.extras.loop.column_search import SearchedTerm, grows
 from xosc_lateral.extras.loop.columns import Column, read_column
 from xosc_lateral.extras.loop.dictionary import Search, beside
 from xosc_lateral.extras.loop.drives import OwnSlopes, own_slopes
-from xosc_lateral.extras.loop.ends import ends_of
 from xosc_lateral.extras.loop.low_frequencies import penalised
 from xosc_lateral.extras.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.extras.loop.omnibus import KERNELS, SECONDS, SMOOTH_COVARIANCE, check_remainder, tents
 from xosc_lateral.extras.loop.passage import Passage, passage_of, typical_passage
-from xosc_lateral.extras.loop.terms.column import of_kind
+from xosc_lateral.extras.loop.terms.column import driven_values, of_kind
 from xosc_lateral.extras.loop.timeline import Coarse, coarse_mean
 
 NEAR_S = 2.0  # Lags that differ from the estimate by up to this are compared. [s]
@@ -85,8 +85,12 @@ class MeanTerm(SearchedTerm):
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change over the driving range; of one column also what the car does in a typical passage."""
-        described, effect = super().describe(fitted, effects, key), effects[0]
-        described = replace(described, own_slopes=self.own_slopes(fitted))
+        described, effect, slopes = super().describe(fitted, effects, key), effects[0], self.own_slopes(fitted)
+        if slopes is not None and slopes.differ:
+            described = replace(described, own_slopes=slopes)
+            if slopes.there:
+                size, error = described.size_m * slopes.size_there, abs(described.size_m) * slopes.error_there
+                described = replace(described, size_m=size, size_error=error)
         if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
             return described
         share = described.size_error / max(abs(described.size_m), 1e-12)
@@ -98,10 +102,12 @@ class MeanTerm(SearchedTerm):
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
         wide = structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors))
-        own = self.own_slopes(fitted)
-        if own is None or not own.differ:
+        slopes = self.own_slopes(fitted)
+        if slopes is None or not slopes.differ:
             return (wide,)
-        return (structs.replace(wide, between_drivers=tuple(own.scatter * np.abs(wide.coefficients))),)
+        sizes = fitted.sizes[part]  # not shrunk: where drives differ, a mean within its error of nothing is no doubt
+        scatter = tuple(slopes.scatter * np.abs(sizes))
+        return (structs.replace(wide, coefficients=tuple(sizes), between_drivers=scatter),)
 
     def own_slopes(self, fitted: Fitted) -> OwnSlopes | None:
         """How it differs from drive to drive."""
@@ -118,12 +124,14 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     fades, over how far it reaches with all of them known. The likelihood is that of independent rows, scaled to the
     variance that stretches of a minute show (Chandler, Bate 2007).
     """
-    ends = ends_of(fitted.coarse, effect)
+    ends = ends_of(effect)
+    held = {name: np.array([ends.low[name], ends.high[name]]) for name in effect.columns} if ends else {}
 
     def between(shape: ColumnEffect) -> FloatArray:
-        return fitted.coarse.settled(shape, ends.high) - fitted.coarse.settled(shape, ends.low)
+        low, high = shape.settled(held)
+        return np.asarray(high - low)
 
-    contrast = between(effect)
+    contrast = between(effect) if ends else np.zeros(1)
     if not contrast.any():
         return 1.0
     white = fitted.whitener.rows
@@ -270,6 +278,7 @@ class CourseTerm(MeanTerm):
             errors=tuple(total * np.abs(self.mix) * self._passage(fitted, sizes, covariance).share_of_error),
             reference=tuple(response.mean(axis=0)),
             response_range=tuple(zip(response.min(axis=0).tolist(), response.max(axis=0).tolist(), strict=True)),
+            driven=driven_values(fitted.coarse, self.columns),
         )
         return (effect,)
 
