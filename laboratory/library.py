@@ -36,8 +36,9 @@ from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs, measured, with_fast_movement
+from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile, fit_runs
+from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_movement
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
