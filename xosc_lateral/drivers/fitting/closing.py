@@ -36,7 +36,7 @@ LIKE = {
     "spread within a drive [m]": 0.1,
     "skewness of the offset": 0.35,
     "kurtosis of the offset": 0.3,
-    "skewness of lateral speed": 0.35,
+    "skewness of lateral speed": 0.5,
     "kurtosis of lateral speed": 0.3,
     "time beyond 0.6 m": 0.55,
     "time beyond 0.9 m": 0.55,
