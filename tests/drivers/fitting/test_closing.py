@@ -91,3 +91,18 @@ def test_what_anybody_wrote_there_says_nothing(rural):
     for look_of in (None, 3, {"numbers": {"a": [1, 2]}}, {"numbers": {"a": 1}, "not_as_measured": ["a"]}):
         odd = replace(rural, provenance=replace(rural.provenance, fit={"look": look_of}))
         assert in_words(odd) == "" == margins_in_words(odd)
+
+
+def test_who_is_derived_from_a_doubted_profile_says_so(rural):
+    found = {"numbers": {"skewness of the offset": [1.2, 0.0]}, "not_as_measured": ["skewness of the offset"]}
+    doubted = replace(rural, provenance=replace(rural.provenance, fit={"look": found}))
+    made = xl.derive_profile(doubted, name="other")
+    said = "rural does not drive as its drives do: skewness of the offset 1.2 becomes 0"
+    assert str(made).endswith(said) and in_words(made.profile) == said == in_words(doubted)
+    assert margins_in_words(made.profile) == ""
+
+
+@pytest.mark.parametrize("noise", [0.0, -0.1, 3.0])
+def test_a_sensor_noise_that_none_has_is_refused_in_words(noise):
+    with pytest.raises(ValueError, match=f"sensor_noise of {noise:g} m: expected 0.0001 to 2 m, or nothing"):
+        xl.fit([], sensor_noise=noise)
