@@ -16,6 +16,7 @@ from xosc_lateral.drivers.fitting.closing import found_in, in_words, look, margi
 from xosc_lateral.drivers.fitting.fitting import fit_warnings
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile
+from xosc_lateral.workflows.profiles.profiles import derive_profile
 
 CASES = Path(__file__).parents[4] / "shared" / "cases" / "fit"
 
@@ -67,6 +68,7 @@ def fitted(name: str) -> DriverProfile:
     return xl.fit(path)
 
 
+@pytest.mark.slow
 def test_a_dead_zone_comes_back_as_no_burst_driver():
     profile = fitted("dead_zone")
     numbers, lacking = found_in(profile)
@@ -96,7 +98,7 @@ def test_what_anybody_wrote_there_says_nothing(rural):
 def test_who_is_derived_from_a_doubted_profile_says_so(rural):
     found = {"numbers": {"skewness of the offset": [1.2, 0.0]}, "not_as_measured": ["skewness of the offset"]}
     doubted = replace(rural, provenance=replace(rural.provenance, fit={"look": found}))
-    made = xl.derive_profile(doubted, name="other")
+    made = derive_profile(doubted, name="other")
     said = "rural does not drive as its drives do: skewness of the offset 1.2 becomes 0"
     assert str(made).endswith(said) and in_words(made.profile) == said == in_words(doubted)
     assert margins_in_words(made.profile) == ""
