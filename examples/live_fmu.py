@@ -18,7 +18,7 @@ def main(folder: Path) -> None:
     except ImportError as error:
         print(f"nothing is simulated: {error}")
         return
-    if not xl.export_fmu(xl.read_profile("motorway-vehicle-3"), unit):
+    if not xl.export_fmu(xl.read_profile("motorway-vehicle-1"), unit):
         print(f"{unit}: source alone, for there is no C compiler here")
         return
     run = fmpy.simulate_fmu(str(unit), stop_time=10.0, step_size=0.05, start_values={"seed": 1}, output=["offset"])

@@ -1,7 +1,7 @@
 """Extra clearance beside neighbours: how much further away a driver keeps while one is near, in tables and in profiles.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m laboratory.clearance dlr.parquet [--profile motorway motorway-refined] [--runs 10]
+    python -m laboratory.clearance dlr.parquet [--profile NAME...] [--runs 10]
 
 Of every vehicle the mean offset while the next vehicle in the neighbouring lane is within a band of distance, less its
 mean in the same lane while there is none within 100 m; so neither the lane nor the place that a driver keeps plays a
@@ -58,7 +58,7 @@ def main() -> None:
     """Print a table per side."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path)
-    parser.add_argument("--profile", nargs="+", default=["motorway", "motorway-refined"])
+    parser.add_argument("--profile", nargs="+", default=["motorway"])
     parser.add_argument("--runs", type=int, default=10)
     args = parser.parse_args()
     timeline = join_drives(list(read_drives(args.table)))

@@ -1,6 +1,6 @@
 """Contacts that lifelike movement brings into the dense template: conversions without resampling.
 
-    python -m laboratory.contacts [--profile auto motorway-refined] [--count 1000]
+    python -m laboratory.contacts [--profile NAME...] [--count 1000]
         [--write PAGE.md]
 
 A contact counts if the nominal scenario lacks it, a departure if a reference point leaves the lane that it keeps
@@ -28,7 +28,7 @@ QUANTILES = (0.0, 0.01, 0.1, 0.5)
 def main() -> None:
     """Print a row per profile."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--profile", nargs="+", default=["auto", "motorway-refined"])
+    parser.add_argument("--profile", nargs="+", default=["auto"])
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--write", type=Path, metavar="PAGE.md", help="page with the markers")
     args = parser.parse_args()

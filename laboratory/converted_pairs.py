@@ -1,7 +1,7 @@
 """Two vehicles beside each other in converted scenarios: the clearance that they keep, beside that of real traffic.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m laboratory.converted_pairs dlr.parquet [--profile motorway motorway-refined] [--seeds 20] [--scene pairs]
+    python -m laboratory.converted_pairs dlr.parquet [--profile NAME...] [--seeds 20] [--scene pairs]
         [--write PAGE.md]
 
 A car overtakes a truck and a car, then two cars drive at the same speed; in right-hand and left-hand traffic, on lanes
@@ -140,7 +140,7 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path)
-    parser.add_argument("--profile", nargs="+", default=["motorway", "motorway-refined"])
+    parser.add_argument("--profile", nargs="+", default=["motorway"])
     parser.add_argument("--seeds", type=int, default=20, help="conversions of each scenario")
     parser.add_argument("--scene", choices=("overtaking", "pairs", "both"), default="both")
     parser.add_argument("--write", type=Path, metavar="PAGE.md", help="page with the markers")

@@ -72,7 +72,7 @@ def default_lines(pools: Sequence[Pool]) -> str:
 def _shown(pools: Sequence[Pool]) -> list[Pool]:
     """Those with cut-ins, without profiles that are variants of another."""
     with_changes = [pool for pool in pools if len(pool.curves[0].leads)]
-    return [pool for pool in with_changes if "refined" not in pool.name and "single" not in pool.name]
+    return [pool for pool in with_changes if "-vehicle-" not in pool.name]
 
 
 def _lead(curve: Curve, k: int) -> str:
@@ -97,7 +97,7 @@ def alarm_figure(pools: Sequence[Pool]) -> Figure:
             "lifelike",
             BLUE,
             "",
-            lambda name: name.startswith("lifelike") and "paper" not in name and "single" not in name,
+            lambda name: name.startswith("lifelike") and "paper" not in name,
         ),
         ("the paper's model", GREEN, DASHED, lambda name: "paper" in name),
     ]

@@ -118,13 +118,9 @@ def pools(given: Given, folder: Path) -> dict[str, Views]:
     scenarios = given.scenarios
     paper = xl.write_profile(xl.fit(drive_table(given.wheel), name="paper", model="two-level"), folder / "paper.json")
     shipped = [profile.stem for profile in sorted(shipped_folder("driver_profiles").glob("*.json"))]
-    single = [name for name in shipped if "-vehicle-" in name]
     found = {"nominal": seen(scenes_of(scenarios))}
-    for profile in [name for name in shipped if name not in single]:
+    for profile in shipped:
         found[f"lifelike: {profile}"] = seen(scenes_of(scenarios, profile, given.variants))
-    if single:
-        every = (scene for profile in single for scene in scenes_of(scenarios, profile, 1))
-        found[f"lifelike: {len(single)} single vehicles"] = seen(every)
     found["lifelike: the paper's model"] = seen(scenes_of(scenarios, str(paper), given.variants))
     found["real: motorway recording"] = seen(recorded(given.wheel))
     for path in given.runs:

@@ -1,6 +1,6 @@
 """Lateral gaps of vehicles side by side, beside those of any two of the two lanes: for `give_way.GAP_QUANTILES`.
 
-    python -m laboratory.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
+    python -m laboratory.give_way WHEEL [--profile NAME...] [--seeds 12] [--write PAGE.md]
 
 Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way
 (`RESPONDING_GAPS`, of `motorway`), and with the law by which `convert` makes them.
@@ -87,7 +87,7 @@ def main() -> None:
     """Print all distributions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path, metavar="WHEEL")
-    parser.add_argument("--profile", nargs="*", default=["motorway", "motorway-refined"])
+    parser.add_argument("--profile", nargs="*", default=["motorway"])
     parser.add_argument("--seeds", type=int, default=12)
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()

@@ -7,9 +7,9 @@ Levels, spreads, effects and slow movement of the motorway profiles come from th
 smoothed; fast movement and its growth with speed from cars with differential GNSS, of which `rural` is made alone.
 
 The same files give the same bytes on the same kind of processor. Every profile is scored before it is written: for
-the population a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the other
-half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
-those of the others; for `rural` a fit to the first file on the other ones. What is written is fitted to all.
+the population a fit to half of the vehicles is scored on the other half; for the single vehicle a fit to the first part
+of the drive is held against the last part of its own drive and those of others; for `rural` a fit to the first file on
+the other ones. What is written is fitted to all.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from laboratory.comparison import driver_distances
-from laboratory.refined import NOTES, refine_population, refined_profile
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
@@ -36,8 +35,10 @@ from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.drivers.evaluation.snippets import sample_runs, snippets_of
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs, measured, with_fast_movement
+from xosc_lateral.drivers.fitting.bands import FastPart, fast_part_of_runs
+from xosc_lateral.drivers.fitting.closing import looked_at
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile, fit_runs
+from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_movement
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -50,8 +51,8 @@ FloatArray = NDArray[np.float64]
 
 SOURCE = "DLR Highway Traffic v1.1.0 (A39 near Braunschweig, 7 October 2024, 5 min, 6.4 km), DLR"
 SEED = 20241007  # the day of the recording
-SINGLE_VEHICLES = 6
-LONG_DRIVE = 140.0  # [s]; of road-following, for a profile of one vehicle
+SINGLE = "motorway-vehicle-1"
+LONG_DRIVE = 140.0  # [s]; of road-following, for the profile of one vehicle
 SPREAD_FACTOR = 1.35  # a single vehicle's profile whose spread is off by more than this is not shipped
 FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
 
@@ -83,17 +84,10 @@ POPULATION = "motorway"
 POPULATION_NOTES = "All vehicles on a two-lane German motorway in the morning: the population."
 
 
-def build_library(
-    source: Path, gnss: Sequence[Path], *, model: str = "best", kept: DriverProfile | None = None
-) -> list[DriverProfile]:
+def build_library(source: Path, gnss: Sequence[Path], *, model: str = "best") -> list[DriverProfile]:
     """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV) and files of OpenACC's AstaZero.
 
     All vehicles were seen by the same cameras: driver and sensor are told apart once, every profile knows the sensor.
-
-    Parameters
-    ----------
-    kept : DriverProfile, optional
-        `motorway-refined` as the closed loop made it before; without, the loop is closed anew: most of the time.
 
     Raises
     ------
@@ -112,18 +106,8 @@ def build_library(
     inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
     known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
     population = _population_profile(seen, known, model)
-    refined = _refined_profile(drives, runs, known) if kept is None else _renewed(kept, known)
-    if not refined.validity.bands:
-        refined = seen.completed(refined, runs)
-    of_all = [replace(profile, beside=ANSWERS) for profile in (population, refined)]
-    profiles = [*of_all, *_single_profiles(seen, kind, known, model), rural]
+    profiles = [replace(population, beside=ANSWERS), _single_profile(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
-
-
-def _renewed(refined: DriverProfile, known: Provenance) -> DriverProfile:
-    """With what is known of its data now."""
-    provenance = replace(refined.provenance, source=known.source, licence=known.licence, inputs=known.inputs)
-    return replace(refined, provenance=provenance)
 
 
 def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:
@@ -217,16 +201,7 @@ def _population_profile(seen: Seen, known: Provenance, model: str) -> DriverProf
     evaluation = _evaluation(seen.completed(half, fitted.driven), seen.of(lambda run: run.drive not in chosen).recorded)
     provenance = replace(known, notes=POPULATION_NOTES, evaluation=evaluation)
     whole = fit_population(seen.driven, name=POPULATION, model=model, provenance=provenance, sensor=seen.sensor)
-    return seen.completed(whole, seen.driven)
-
-
-def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:
-    """The same for what the closed loop makes of all vehicles, on the same halves."""
-    chosen = _fitted_half(runs)
-    half = refine_population([drive for drive in drives if drive.name in chosen], SEED).refined
-    evaluation = _evaluation(half, [run for run in runs if run.drive not in chosen])
-    known = replace(known, notes=NOTES, evaluation=evaluation)
-    return refined_profile(refine_population(drives, SEED, known))
+    return looked_at(seen.completed(whole, seen.driven), seen.driven)
 
 
 def _fitted_half(runs: Sequence[Run]) -> set[str]:
@@ -249,26 +224,22 @@ def _evaluation(half: DriverProfile, others: Sequence[Run]) -> dict[str, Any]:
 
 
 # ---- single vehicles -------------------------------------------------------------------------------------------------
-def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, model: str) -> list[DriverProfile]:
-    """Vehicles with long drives whose movement differs most from one another."""
+def _single_profile(seen: Seen, kind: Mapping[str, str], known: Provenance, model: str) -> DriverProfile:
+    """The most ordinary of the vehicles with long drives that stay themselves, beside the others of these."""
     long = _long_drives(seen)
     whole = {name: fit_runs(mine, name=name, model=model) for name, mine in long.items()}
     long = {name: mine for name, mine in long.items() if _describes(whole[name], mine)}
-    chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
-    parts = {name: split_in_time(long[name]) for name in chosen}
-    early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
-    distance = driver_distances(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
-    profiles = []
-    for k, name in enumerate(chosen):
-        evaluation = _own_distance(distance[k], k)
-        label = f"motorway-vehicle-{k + 1}"
-        notes = f"One {kind[name]}, {_place_and_spread(long[name])}."
-        provenance = replace(
-            known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
-        )
-        fitted = fit_runs(long[name], name=label, model=model, provenance=provenance)
-        profiles.append(seen.completed(replace(fitted, sensor=seen.sensor), long[name]))
-    return profiles
+    steady = by_ordinariness({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
+    name, parts = steady[0], {name: split_in_time(long[name]) for name in steady}
+    late = [sliding_snippets(parts[one][1]) for one in steady]
+    evaluation = _own_distance(driver_distances([fit_runs(parts[name][0], name=name, model=model)], late, SEED)[0], 0)
+    notes = (
+        f"One {kind[name]}, {_place_and_spread(long[name])}: the most ordinary of {len(steady)} long, steady drives."
+    )
+    fit = {"vehicle": name, "vehicle_class": kind[name]}
+    provenance = replace(known, notes=notes, evaluation=evaluation, fit=fit)
+    fitted = fit_runs(long[name], name=SINGLE, model=model, provenance=provenance)
+    return looked_at(seen.completed(replace(fitted, sensor=seen.sensor), long[name]), long[name])
 
 
 def _long_drives(seen: Seen) -> dict[str, list[Run]]:
@@ -298,8 +269,8 @@ def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
     return 1.0 / SPREAD_FACTOR <= figures_of(profile)[0].spread / measured <= SPREAD_FACTOR
 
 
-def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
-    """Names of drivers that differ visibly and stay themselves: each next one is farthest from all before it.
+def by_ordinariness(snippets: Mapping[str, FloatArray]) -> list[str]:
+    """Names of drivers that stay themselves, the most ordinary first: nearest to the mean of all of these.
 
     Drivers are compared by the mean of their ten metrics, in units of what one driver's mean changes by from the first
     half of the drive to the second. The half of the drivers that changes most is left out: a profile of somebody who
@@ -313,23 +284,18 @@ def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHIC
     Raises
     ------
     NotEnoughDataError
-        If there are fewer than twice as many drivers as asked for.
+        If there are fewer than four drivers.
     """
     names = sorted(snippets)
-    if len(names) < 2 * count:
-        raise NotEnoughDataError(
-            f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; {2 * count} are needed to choose {count}"
-        )
+    if len(names) < 4:
+        raise NotEnoughDataError(f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; 4 are needed")
     metrics = [snippet_metrics(snippets[name]) for name in names]
     change = np.array([one[: len(one) // 2].mean(axis=0) - one[len(one) // 2 :].mean(axis=0) for one in metrics])
     unit = np.sqrt((change**2).mean(axis=0))
-    steady = np.argsort(((change / unit) ** 2).sum(axis=1), kind="stable")[: max(count, len(names) // 2)]
+    steady = np.argsort(((change / unit) ** 2).sum(axis=1), kind="stable")[: len(names) // 2]
     points = np.array([metrics[k].mean(axis=0) for k in steady]) / unit
-    chosen = [int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))]  # the most ordinary one first
-    while len(chosen) < count:
-        nearest = np.min([((points - points[k]) ** 2).sum(axis=1) for k in chosen], axis=0)
-        chosen.append(int(np.argmax(nearest)))
-    return [names[steady[k]] for k in chosen]
+    order = np.argsort(((points - points.mean(axis=0)) ** 2).sum(axis=1), kind="stable")
+    return [names[steady[k]] for k in order]
 
 
 def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:

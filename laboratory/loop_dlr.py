@@ -4,8 +4,7 @@
     python -m laboratory.loop_dlr dlr.parquet [--seed 20241007] [--write PAGE.md]
         [--figures docs/figures]
 
-Starts from a two-level model of the same drives, and from the seed of the library's `motorway-refined`, as
-`make loop-dlr` does.
+Starts from a two-level model of the same drives, as `make loop-dlr` does.
 """
 
 from __future__ import annotations
@@ -16,8 +15,9 @@ from pathlib import Path
 
 from laboratory.library import SEED
 from laboratory.markers import show
-from laboratory.refined import refine_population
-from xosc_lateral.extras.loop.close import LoopResult
+from xosc_lateral.drivers.fitting.fitting import fit_profile
+from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.extras.loop.close import LoopResult, close_loop
 from xosc_lateral.extras.loop.loop_figures import DRAWINGS, effect_figure, residual_figure, spectrum_figure
 from xosc_lateral.extras.loop.loop_words import loop_text
 from xosc_lateral.extras.loop.residual import LackOfFit
@@ -33,7 +33,9 @@ def main() -> None:
     parser.add_argument("--figures", type=Path, metavar="FOLDER")
     args = parser.parse_args()
     started = time.perf_counter()
-    result = refine_population(read_drives([args.table]), args.seed)
+    drives = read_drives([args.table])
+    base = fit_profile(drives, name="motorway-base", model=ModelKind.TWO_LEVEL)
+    result = close_loop(drives, base, seed=args.seed, name="motorway-refined")
     took = time.perf_counter() - started
     show(
         f"```\n{loop_text(result)}\n```\n\nIn {took:.0f} s.\n\n{group_table(result.lack_of_fit)}",

@@ -13,14 +13,19 @@ from __future__ import annotations
 import argparse
 import io
 import zipfile
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from msgspec.structs import replace
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from xosc_lateral.base.own_clock import clock_rate
+from xosc_lateral.drivers.evaluation.metrics import free_runs
+from xosc_lateral.files.profiles import find_profile, read_profile
 
 FloatArray = NDArray[np.float64]
 EDGES = np.array([0.3, 1.0, 2.0, 3.0, 5.0, 7.0, 9.0, 13.0, 17.0])
@@ -99,6 +104,16 @@ def figures(speed: FloatArray, lateral: FloatArray, weight: FloatArray) -> Float
     return np.append(relative, np.polyfit(middle, np.log(relative), 1, w=np.sqrt(rows))[0])
 
 
+@cache
+def sampled(lag: float) -> float:
+    """How far drivers of `motorway` move sideways within a time [s] of their own clock, root mean square. [m]"""
+    profile = replace(read_profile(find_profile("motorway")), effects=())
+    runs = free_runs(profile, 1, drivers=40, duration=600.0)
+    course = CubicSpline(profile.model.step * np.arange(runs.shape[1]), runs, axis=1)
+    at = np.arange(5.0, 590.0, 0.5)
+    return float(np.sqrt(((course(at + lag) - course(at)) ** 2).mean()))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path)
@@ -114,8 +129,10 @@ def main() -> None:
     print(f"{len(names)} vehicles, {len(who)} stretches of 2 s")
     for k in range(len(EDGES) - 1):
         pace = 0.5 * (EDGES[k] + EDGES[k + 1])
-        law = float(clock_rate(np.array([pace]))[0])
-        print(f"{EDGES[k]:g} to {EDGES[k + 1]:g} m/s: {whole[k]:.2f} ({low[k]:.2f} to {high[k]:.2f}), law {law:.2f}")
+        rate = float(clock_rate(np.array([pace]))[0])
+        measured = f"{whole[k]:.2f} ({low[k]:.2f} to {high[k]:.2f})"
+        made = sampled(WINDOW * rate) / sampled(WINDOW)
+        print(f"{EDGES[k]:g} to {EDGES[k + 1]:g} m/s: {measured}, sampled {made:.2f} (clock {rate:.2f})")
     print(f"power of speed: {whole[-1]:.2f} ({low[-1]:.2f} to {high[-1]:.2f})")
 
 

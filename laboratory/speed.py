@@ -37,7 +37,7 @@ VERB = (sys.executable, "-m", "xosc_lateral")
 LONGEST = 60.0
 """esmini plays on where a scenario has no end. [s]"""
 
-REPLAYED = {"profile": "motorway-refined", "mode": "trajectory", "ego": "none", "force": True}
+REPLAYED = {"profile": "motorway", "mode": "trajectory", "ego": "none", "force": True}
 
 HEADER = ("what", "CPU time", "at most", "beside", "memory")
 
@@ -207,9 +207,8 @@ def batches(table: Table, options: argparse.Namespace, folder: Path) -> None:
 def drivers(table: Table) -> None:
     """Sampling, fitting, closing the loop."""
     raw = table.line("10 h of normal numbers at 5 Hz", normals)
-    for profile in ("motorway", "motorway-refined"):
-        beside = times(raw, "the numbers")
-        table.line(f"`sample` of `{profile}` for 10 h", sample, profile, at_most="15 times", beside=beside)
+    beside = times(raw, "the numbers")
+    table.line("`sample` of `motorway` for 10 h", sample, "motorway", at_most="15 times", beside=beside)
     table.line("`fit` of 50 min at 25 Hz", fit)
     table.line("`close_loop` of 50 min at 10 Hz", loop)
 

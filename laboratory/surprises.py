@@ -94,9 +94,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--speed", type=float, default=33.0)
-    parser.add_argument(
-        "--profiles", nargs="*", default=["motorway", "motorway-refined", "motorway-vehicle-3", "rural"]
-    )
+    parser.add_argument("--profiles", nargs="*", default=["motorway", "motorway-vehicle-1", "rural"])
     parser.add_argument("--no-c", action="store_true")
     parser.add_argument("--fmu", action="store_true")
     given = parser.parse_args()

@@ -225,11 +225,11 @@ def results(wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Seque
                 trained, at_home = one, scored(one, views)
             else:
                 trained, at_home = out_of_fold(learner_of(one, seed), views, home)
-            chosen = {goal.text: carried(goal, trained, at_home, home) for goal in goals}
-            limits = {text: float(each.limits[each.chosen]) for text, each in chosen.items()}
+            chosen = [carried(goal, trained, at_home, home) for goal in goals]
+            limits = {one.home.goal.text: float(one.limits[one.chosen]) for one in chosen if one.home.met}
             if not isinstance(one, Detector):
                 limits["p = 0.5"] = 0.0
-            for found in at(trained, limits, tested, runs):
+            for found in at(trained, limits, tested, runs) if limits else ():
                 yield {**key, "detector": name, **found}
         if home != "nominal":
             yield {**key, "detector": "shortcut", "goal": "AUC", **told(views, tested)}

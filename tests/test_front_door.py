@@ -148,9 +148,9 @@ def test_a_conversion_that_is_not_written_is_the_one_that_would_be(tmp_path):
 
 
 def test_a_profile_goes_in_by_name_path_and_object(tmp_path):
-    profile = xl.read_profile("motorway-vehicle-2")
+    profile = xl.read_profile("motorway-vehicle-1")
     path = xl.write_profile(profile, tmp_path)
-    same = (profile, path, str(path), "motorway-vehicle-2")
+    same = (profile, path, str(path), "motorway-vehicle-1")
     frames = [xl.sample(one, duration=10.0, seed=2).to_frame() for one in same]
     assert all(frame.equals(frames[0]) for frame in frames)
 

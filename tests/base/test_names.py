@@ -18,6 +18,7 @@ from lxml import etree
 from msgspec.structs import replace
 
 from tests.kit.compiled import build
+from tests.kit.profiles import REFINED
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.names import in_c, in_c_comment, in_csv, in_json, in_terminal, unwritable
 from xosc_lateral.drivers.model.effects import Acts, Linear
@@ -133,7 +134,7 @@ def test_half_a_character_in_a_profile_is_one_line(tmp_path: Path) -> None:
     "column", ['??/");system("touch planted");//', '"*/ #error @INPUTS@ \u202e', "ends in ??/", "DRIVER \\"]
 )
 def test_a_driver_is_compiled_whatever_its_columns_and_licences_are_called(column: str, tmp_path: Path) -> None:
-    profile = read_profile("motorway-refined")
+    profile = read_profile(REFINED)
     effect = Linear(acts=Acts.LOCATION, column=column, coefficients=(0.1,), errors=(0.1,), reference=(0.0,))
     metadata = replace(profile.metadata, licence=f"{column} @SIZES@ {'x ' * 70}{column}")
     profile = replace(profile.with_effects(effect), name=column, metadata=metadata)

@@ -10,6 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from examples.driver_simulator import simulate_drive, simulate_population
+from tests.kit.profiles import REFINED
 from xosc_lateral.cli import main
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
@@ -51,7 +52,7 @@ def test_every_schema_is_one_and_is_listed():
         ("convert", "convert in/cut-in.xosc -o one.xosc --report one.html --time-limit 5"),
         (
             "convert",
-            "convert in/cut-in.xosc -o two.xosc --ego none --enrich Ego --profile motorway-refined --time-limit 5",
+            f"convert in/cut-in.xosc -o two.xosc --ego none --enrich Ego --profile {REFINED} --time-limit 5",
         ),
         ("play", "states in/cut-in.xosc -o states.csv --time-limit 1"),
         ("segments", "segments in/cut-in.xosc"),
@@ -66,7 +67,7 @@ def test_every_schema_is_one_and_is_listed():
         ("template-list", "template list"),
         ("template-write", "template write curves -o written --set radius=800"),
         ("profiles-list", "profiles list"),
-        ("profiles-show", "profiles show motorway-refined"),
+        ("profiles-show", f"profiles show {REFINED}"),
         ("profiles-compare", "profiles compare motorway motorway-vehicle-1"),
         ("profiles-derive", "profiles derive motorway-vehicle-1 --preset drowsy -o derived.json"),
     ],

@@ -14,7 +14,7 @@ from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.profiles.profiles import add_profile
 
-BASES = ("motorway", "motorway-vehicle-5", "motorway-vehicle-2", "motorway-vehicle-3")
+BASES = ("motorway", "motorway-vehicle-1", "rural")
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +225,7 @@ def test_outputs_say_which_profile_they_used(tmp_path, capsys):
 
     assert [(name, entities, True) for name, entities, _ in uses("mine")] == uses("mine")
     assert [entities for _, entities, _ in uses("mine")] == [["Truck"]]
-    assert len(uses("motorway")) == 2 and uses("motorway-refined") == []
+    assert len(uses("motorway")) == 2 and uses("rural") == []
     assert run(capsys, "profiles", "tag", "mine", "--library", tmp_path / "lib", "--tag", "new")[0] == 0
     assert [is_current for _, _, is_current in uses("mine")] == [False]
     assert run(capsys, "profiles", "remove", "mine", "--library", tmp_path / "lib")[0] == 0

@@ -18,7 +18,7 @@ import pandas as pd
 from examples.driver_simulator import simulate_drive
 from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
-from tests.kit.profiles import simulated_profile
+from tests.kit.profiles import REFINED, simulated_profile
 from tests.kit.scenario_files import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.limits import context_range
@@ -126,12 +126,12 @@ def _use_driver(path: Path) -> None:
 
 
 def _stream_files(folder: Path) -> Iterable[Path]:
-    for number, name in enumerate(("motorway", "motorway-refined")):
-        stream = OffsetStream(read_profile(name), 3)
+    for name, profile in (("motorway", "motorway"), ("refined", REFINED)):
+        stream = OffsetStream(read_profile(profile), 3)
         for k in range(400):
             stream.step({"speed": 30.0 + 0.01 * k})
-        (folder / f"{name}{number}.json").write_text(json.dumps(stream.to_dict()))
-        yield folder / f"{name}{number}.json"
+        (folder / f"{name}.json").write_text(json.dumps(stream.to_dict()))
+        yield folder / f"{name}.json"
 
 
 def _use_stream(path: Path) -> None:

@@ -58,7 +58,7 @@ def in_child(work: Callable[[], object], before: Callable[[], object] | None = N
 VERBS = {
     "sample": "sample -p motorway -o {out}/o.csv --duration 20 | 60",
     "template": "template write cut-in -o {out} --set lane_width=3.75 | lane_width=3.5",
-    "export": "export c -o {out} --force -p motorway | motorway-vehicle-3",
+    "export": "export c -o {out} --force -p motorway | motorway-vehicle-1",
     "convert": "convert {given}/cut-in.xosc -o {out}/o.xosc --report {out}/r.html --time-limit 3 --seed 1 | 2",
     "reproduce": "reproduce -o {out}/o.xosc {given}/first.xosc | {given}/second.xosc",
     "states": "states {given}/cut-in.xosc -o {out}/o.csv --time-limit 2 | 3",
@@ -69,7 +69,7 @@ VERBS = {
     "detect": "detect {given}/cut-in.xosc -o {out}/o.csv --report {out}/o.html --time-limit 12 --seed 1 | 2",
     "import": "import table -o {out}/o.csv {given}/drive.csv | {given}/other.csv",
     "reconstruct": "reconstruct {given}/tracks.csv --road {given}/road.xodr -o {out}/ --force --version 1.2 | 1.1",
-    "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway-vehicle-2 | motorway-vehicle-3",
+    "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway | rural",
     "add": "profiles add {given}/own.json --library {out} --force --tag day | night",
 }
 """A command whose last word has two values: of a former run, and of the one that is hindered."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from xosc_lateral.drivers.model.effects import ColumnEffect, Effect, EffectTerms
 from xosc_lateral.drivers.model.effects.base import step_of, terms_of
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.records import read_as
+
+REFINED = str(Path(__file__).parents[1] / "data" / "profiles" / "motorway-refined.json")
+"""A profile that a closed loop made of the motorway recording: effects of columns, hidden ones, drivers that differ."""
 
 
 def effect_from_dict(values: dict[str, object]) -> Effect:

@@ -1,9 +1,9 @@
 """The clock that a driver's movement in the lane runs on: real time from 40 km/h on, slower below, none at rest.
 
 A car that stands does not slide: it stays where its driver stopped, and how far drivers spread stays too. Below 40 km/h
-drivers move sideways nearly as fast as above. At a signalled junction (DLR Urban Traffic v1.2.0, 0 to 17 m/s) lateral
-speed grows with speed to the power of 0.2 to 0.4: movement goes neither by the distance driven nor by time, and it does
-not fade (docs/validation/driver_model.md).
+drivers move sideways nearly as fast as above: movement goes neither by the distance driven nor by time, and it does not
+fade. How much slower is what vehicles do at a signalled junction (DLR Urban Traffic v1.2.0, 0 to 17 m/s), by classes of
+speed (docs/validation/driver_model.md).
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ import numpy as np
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import MINIMUM_SPEED
 
-HALF_RATE_SPEED = 1.0
-"""Speed at which the clock runs about half as fast. The recording is fitted best by 0.4 or by 2 m/s, as its lanes are
-known: errors of its tracker make slow rows too lively, those of lanes fast ones. [m/s]"""
+CLOCK_SPEEDS = (0.0, 0.65, 1.5, 2.5, 4.0, 6.0, 8.0, MINIMUM_SPEED)
+"""Middles of the classes, and their ends. [m/s]"""
+CLOCK_RATES = (0.0, 0.32, 0.44, 0.53, 0.65, 0.80, 0.89, 1.0)
+"""Rates of the clock there, with which sampled drivers move sideways over 2 s as fast as vehicles of each class did,
+relative to those at 9 to 13 m/s; between two, a straight line. [-]"""
 
 LARGEST_HEADING = float(np.deg2rad(3.0))
 """Of a car that keeps its lane, relative to it: what would turn it further is put off. [rad]"""
@@ -34,15 +36,13 @@ def is_slow(speed: FloatArray) -> BoolArray:
 
 def clock_rate(speed: FloatArray) -> FloatArray:
     """Seconds of the driver's clock per second at a speed [m/s] in either direction, any shape, 0 to 1. [-]"""
-    pace = np.abs(speed)
-    rate = pace * (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED) / (pace + HALF_RATE_SPEED)
-    return np.where(is_slow(speed), np.minimum(rate, 1.0), 1.0)
+    return np.where(is_slow(speed), np.interp(np.abs(speed), CLOCK_SPEEDS, CLOCK_RATES), 1.0)
 
 
 def way_of(speed: FloatArray) -> FloatArray:
-    """Distance driven in a second of the driver's clock at a speed [m/s], any shape; 0.9 m as it comes to rest. [m]"""
-    pace = np.abs(speed)
-    return np.maximum(pace, (pace + HALF_RATE_SPEED) / (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED))
+    """Distance driven in a second of the driver's clock at a speed [m/s], any shape; 2 m as it comes to rest. [m]"""
+    pace = np.maximum(np.abs(speed), CLOCK_SPEEDS[1])  # below, the rate is in proportion to the speed
+    return np.asarray(pace / clock_rate(pace))
 
 
 def own_time(time: FloatArray, speed: FloatArray) -> FloatArray:

@@ -44,7 +44,7 @@ class _WithPanels(TyperCommand):
     app, "convert", VERBS["convert"],
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
-    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
+    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-1 | grep Vertex",
     cls=_WithPanels,
 )
 def convert(

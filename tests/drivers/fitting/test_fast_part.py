@@ -19,12 +19,11 @@ from xosc_lateral.drivers.fitting.bands import (
     fast_part_of_runs,
     growth_with_speed,
     shows_growth,
-    split_by_band,
     steering_gain,
-    visible_below,
     with_fast_part,
 )
 from xosc_lateral.drivers.fitting.fitting import fit_profile, smoothed_above
+from xosc_lateral.drivers.fitting.joined_bands import split_by_band, visible_below
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.sampled_offsets import sample_free
 from xosc_lateral.drivers.model.sensor import SensorModel
@@ -124,7 +123,7 @@ def test_a_second_recording_gives_back_what_the_provider_took() -> None:
     powers = [power_at(profile, 0.3, 25.0) / expected for profile in (both, alone)]
     assert powers[0] == pytest.approx(1.0, abs=0.4)
     assert powers[1] < 0.03  # 15 dB below
-    assert [band.high for band in both.validity.bands] == [0.15, 1.5]
+    assert [(band.low, band.high) for band in both.validity.bands] == [(0.0, 0.1), (0.15, 1.5)]
     assert alone.validity.highest_frequency == 0.1
     shows_all = fit_profile(clean, name="clean", stand_in=lambda: pytest.fail("drives that show all need no other"))
     by_prior = fit_profile(smoothed, name="prior", prior=shows_all)

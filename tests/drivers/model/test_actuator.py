@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.kit.compiled import CompiledDriver
+from tests.kit.profiles import REFINED
 from tests.kit.stepped import stepped_offsets
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.model.actuator import drivable_step, fault_in_words, pay_off, stopping_speed
@@ -37,7 +38,7 @@ STEPPED: list[dict[str, float]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["motorway", "motorway-refined"])
+@pytest.mark.parametrize("name", ["motorway", REFINED])
 def test_a_column_that_steps_throws_nobody_and_is_responded_to_in_the_end(name: str) -> None:
     profile = read_profile(name)
     still = driven(profile, 25.0, 12.0)[0]
@@ -80,7 +81,7 @@ def planted(profile: DriverProfile, coefficient: float) -> DriverProfile:
 
 @pytest.mark.parametrize("coefficient", [50.0, -50.0, 1e300])
 def test_an_effect_that_wants_what_cannot_be_driven_is_left_out_and_named(coefficient: float, tmp_path: Path) -> None:
-    profile = planted(read_profile("motorway-refined"), coefficient)
+    profile = planted(read_profile(REFINED), coefficient)
     moved, traffic = driven(profile, 20.0, 8.0, lane_index=2.0)
     assert np.abs(moved).max() < 1.5
     assert set(traffic.faults.values()) == {"effect 2, levels of lane_index"}
@@ -94,7 +95,7 @@ def test_an_effect_that_wants_what_cannot_be_driven_is_left_out_and_named(coeffi
 
 
 def test_movement_that_cannot_be_driven_stays_near_the_lane_and_is_named() -> None:
-    profile = read_profile("motorway-refined").with_effects(Step(size=40.0, at_s=5.0))
+    profile = read_profile(REFINED).with_effects(Step(size=40.0, at_s=5.0))
     moved, traffic = driven(profile, 40.0, 50.0)
     assert np.abs(moved).max() <= 1.5 * 3.5 + 1e-9
     assert np.abs(moved[700:]).max() < 0.1  # back to the lane's centre
@@ -103,7 +104,7 @@ def test_movement_that_cannot_be_driven_stays_near_the_lane_and_is_named() -> No
 
 def test_who_would_cross_the_lane_too_fast_is_held_to_a_heading_that_can_be_driven(tmp_path: Path) -> None:
     """Weaving over 9 m within 10 s: no acceleration that a tyre lacks the grip for, but 15 degrees at 40 km/h."""
-    profile = read_profile("motorway-refined").with_effects(Cycle(amplitude=4.5, period_s=10.0))
+    profile = read_profile(REFINED).with_effects(Cycle(amplitude=4.5, period_s=10.0))
     moved, traffic = driven(profile, 30.0, 40.0)
     turned = np.abs(np.diff(moved[round(2.0 / STEP) :], axis=0)).max() / STEP / 11.2
     assert 0.14 < turned < 0.18 and np.abs(moved).max() <= 1.5 * 3.5
@@ -118,7 +119,7 @@ def test_who_would_cross_the_lane_too_fast_is_held_to_a_heading_that_can_be_driv
 
 def test_a_profile_is_tried_over_its_columns_where_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "p.json"
-    write_profile(planted(read_profile("motorway-refined"), 50.0), path)
+    write_profile(planted(read_profile(REFINED), 50.0), path)
     with pytest.raises(
         FormatError, match=r"effect 2 \(levels of lane_index\): an offset of 36\.\d+ m; lane widths"
     ) as e:

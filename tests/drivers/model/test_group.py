@@ -9,6 +9,7 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from tests.kit.profiles import REFINED
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.effects import Acts, Cycle, Drift, Linear
 from xosc_lateral.drivers.model.group import OffsetGroup
@@ -45,9 +46,9 @@ def with_rate(profile: DriverProfile) -> DriverProfile:
     return replace(profile, effects=(*profile.effects, effect))
 
 
-@pytest.mark.parametrize("name", ["motorway", "motorway-refined", "motorway-vehicle-3", "rate"])
+@pytest.mark.parametrize("name", ["motorway", REFINED, "motorway-vehicle-1", "rate"])
 def test_each_driver_is_the_stream_of_his_seed_whoever_comes_and_goes(name: str) -> None:
-    profile = with_rate(read_profile("motorway-vehicle-3")) if name == "rate" else read_profile(name)
+    profile = with_rate(read_profile("motorway-vehicle-1")) if name == "rate" else read_profile(name)
     ticks, n = 90, 5
     rows = contexts(n, ticks, np.random.default_rng(7))
     width = np.linspace(3.2, 3.9, n)

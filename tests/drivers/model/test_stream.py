@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from tests.kit.profiles import REFINED
 from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import Segment
@@ -297,7 +298,7 @@ def _leaves(values: object, path: tuple[object, ...] = ()) -> list[tuple[object,
 
 @pytest.mark.parametrize("rate", [None, 50.0])
 def test_an_edited_state_is_refused_or_leads_to_offsets_of_a_lane(rate: float | None) -> None:
-    profile, chance = read_profile("motorway-refined"), random.Random(7)
+    profile, chance = read_profile(REFINED), random.Random(7)
     stream = OffsetStream(profile, 3, rate=rate)
     for _ in range(33):
         stream.step(ROAD_CONTEXT)

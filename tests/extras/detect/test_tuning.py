@@ -118,15 +118,35 @@ for line in sys.stdin:
 def test_a_program_of_ones_own_gets_its_row_in_one_line_whatever_its_scores_are(folder, capsys):
     (folder / "mine.py").write_text(OWN)
     words = ["detect", "cut-in.xosc", "--home", "home", "--variants", "1", "--ego", "none", "--tune", "20/h"]
-    assert main([*words, "--detector", f"{sys.executable} mine.py", "--detector", "lateral-speed", "--json"]) == 0
+    assert main([*words, "--detector", f"{sys.executable} mine.py", "--detector", "lateral-speed", "--json"]) == 1
     answer = json.loads(capsys.readouterr().out)
     Draft202012Validator(json.loads(SCHEMA.read_text())).validate(answer)
     rows = [(row["source"], row["home"], row["detector"].split()[-1]) for row in answer["rows"]]
     sources, homes = ("cut-in", "cut-in, motorway"), ("home", "home, motorway")
     assert rows == [(one, home, last) for one in sources for last in ("mine.py", "0.4)") for home in homes]
     nominal, lifelike = answer["rows"][:2]
-    assert nominal["threshold"] < 1e-3 and 1.0 < lifelike["threshold"] < 100.0
-    assert all(row["home_met"] and row["home_false_alarms_per_hour"] <= 20.0 for row in answer["rows"])
+    assert nominal["threshold"] is None and 1.0 < lifelike["threshold"] < 100.0
+    assert [row["home_met"] for row in answer["rows"]] == [row["home"] == homes[1] for row in answer["rows"]]
+    assert all(row["home_false_alarms_per_hour"] <= 20.0 for row in answer["rows"])
+
+
+def test_a_goal_that_no_threshold_meets_is_said_on_page_and_text_and_by_the_exit_status(folder, capsys):
+    """Nobody moves inside a lane as written: any number of false alarms an hour is met, and sets nothing."""
+    words = ["detect", "cut-in.xosc", "--home", "home", "--ego", "none", "--detector", "lateral-speed"]
+    assert main([*words, "--tune", "20/h", "--report", "page.html"]) == 1
+    said = "lateral-speed (hold 0.4) on home: cannot be set here, no alarm at any threshold"
+    text = capsys.readouterr().out
+    for shown in (text, (folder / "page.html").read_text()):
+        assert said in shown and "Less than an hour of lane keeping" in shown
+    assert main([*words, "--tune", "90%"]) == 0  # which lane changes set
+    assert "cannot be set" not in capsys.readouterr().out
+
+
+def test_a_rate_that_no_threshold_exceeds_sets_nothing():
+    at_home = scored(LateralSpeed(), traffic(6))
+    assert carried(read_goal("20/h"), LateralSpeed(), at_home, "made").home.met
+    calm = carried(read_goal("100000/h"), LateralSpeed(), at_home, "made").home
+    assert not calm.met and calm.why_not.endswith("an hour at any threshold")
 
 
 def test_the_same_source_as_home_and_tried_is_set_on_other_vehicles(folder):

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from tests.kit.compiled import SANITIZED, CompiledDriver, build, row_of, segment_of, varying
 from tests.kit.effects import EXAMPLES, OF_OTHER_COLUMNS, made
+from tests.kit.profiles import REFINED
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
@@ -134,7 +135,7 @@ def test_a_column_that_is_not_known_does_not_act(tmp_path: Path) -> None:
 def test_without_looking_ahead_the_driver_responds_later_and_at_any_step_follows_the_streams_curve(
     tmp_path: Path,
 ) -> None:
-    profile = read_profile("motorway-refined")
+    profile = read_profile(REFINED)
     driver = CompiledDriver(profile, tmp_path)
     context = varying(driver.columns, 150, 8) | {"speed": np.full(150, 30.0)}
     stream = OffsetStream(profile, child(np.random.SeedSequence(8), 0), rate=1000.0)
@@ -245,7 +246,7 @@ def test_effects_and_models_of_plug_ins_are_refused_by_name(tmp_path: Path) -> N
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_it_compiles_without_a_warning_and_the_example_runs_under_sanitizers(name: str, tmp_path: Path) -> None:
     write_profile(two_level(), tmp_path / "two.json")
-    for number, profile in enumerate(("motorway-refined", str(tmp_path / "two.json"))):
+    for number, profile in enumerate((REFINED, str(tmp_path / "two.json"))):
         folder = tmp_path / str(number)
         assert main(["export", "c", "-p", profile, "-o", f"{folder}/", "-q"]) == 0
         program = build(sorted(folder.glob("*.c")), folder / "example", *SANITIZED, name=name)

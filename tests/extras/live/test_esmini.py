@@ -174,7 +174,7 @@ def test_neighbours_give_way_to_the_ego_where_it_really_is() -> None:
     for aside in (0.0, 0.6):  # the ego leans to the left, towards who overtakes it
         player = StandIn()
         open_player(player, CUT_IN)
-        traffic = EsminiTraffic(player, CUT_IN, read_profile("motorway-vehicle-3"), ego="Ego", seed=1)
+        traffic = EsminiTraffic(player, CUT_IN, read_profile("motorway-vehicle-1"), ego="Ego", seed=1)
         found = {}
         while player.SE_GetSimulationTime() < 11.0:
             traffic.steer(0.04)

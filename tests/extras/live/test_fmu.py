@@ -15,6 +15,7 @@ import pytest
 
 import xosc_lateral as xl
 from tests.kit.compiled import SANITIZED, build, compiler, gentle
+from tests.kit.profiles import REFINED
 from xosc_lateral.cli import main
 from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.extras.live.c_numbers import inputs_of
@@ -182,7 +183,7 @@ def test_under_a_context_that_changes_gently_it_is_what_is_sampled_a_preview_lat
     version: str, tmp_path: Path
 ) -> None:
     compiler()
-    profile = xl.read_profile("motorway-refined")
+    profile = xl.read_profile(REFINED)
     unit = exported(version, tmp_path / "driver.fmu", profile=profile.name)
     context = gentle(inputs_of(profile), 300)
     late = np.maximum(np.arange(300) - round(xl.OffsetStream(profile, 0, rate=100.0).preview / 0.2), 0)
@@ -201,10 +202,10 @@ def test_slow_driving_maneuvers_and_surprises_are_as_in_live_traffic(version: st
     time = 0.05 * np.arange(1600)
     context = {"speed": np.clip(20.0 + 25.0 * np.sin(time / 9.0), 0.0, None), "lane_width": np.full(1600, 3.5)}
     more = {"following": (time % 20.0 > 6.0) | (time < 14.0), "position": 1.5 * np.sin(time)}
-    unit = exported(version, tmp_path / "driver.fmu", profile="motorway-refined")
+    unit = exported(version, tmp_path / "driver.fmu", profile=REFINED)
     context |= {"lane_index": np.floor(time / 11.0) % 2.0, "is_truck": np.zeros(1600)}
     context |= {f"{side}_distance": np.where(time % 17.0 < 4.0, 8.0, np.inf) for side in ("left", "right")}
-    traffic, offset, wanted = Alone(xl.read_profile("motorway-refined"), seed=3), 0.0, []
+    traffic, offset, wanted = Alone(xl.read_profile(REFINED), seed=3), 0.0, []
     for row in range(1600):
         seen = {name: values[row : row + 1] for name, values in context.items()}
         follows = more["following"][row : row + 1]
@@ -277,7 +278,7 @@ def test_it_runs_where_this_package_is_not(version: str, tmp_path: Path) -> None
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_sources_compile_without_a_warning_and_several_units_link_into_one_program(name: str, tmp_path: Path) -> None:
     sources = []
-    for version, profile in (("2.0", "motorway"), ("3.0", "motorway-refined"), ("3.0", "rural")):
+    for version, profile in (("2.0", "motorway"), ("3.0", REFINED), ("3.0", "rural")):
         unit = exported(version, tmp_path / f"{profile}.fmu", "--compiler", compiler(name), profile=profile)
         with zipfile.ZipFile(unit) as archive:
             archive.extractall(tmp_path / profile)

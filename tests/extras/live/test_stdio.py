@@ -29,7 +29,7 @@ def says(values: object, side: str) -> None:
 
 
 def test_lines_are_as_the_schema_has_them_and_give_the_driver_of_the_seed() -> None:
-    pipe = Pipe(read_profile("motorway-vehicle-3"), seed=4)
+    pipe = Pipe(read_profile("motorway-vehicle-1"), seed=4)
     found = []
     for line in lines(40):
         says(json.loads(line), "in")
@@ -39,7 +39,7 @@ def test_lines_are_as_the_schema_has_them_and_give_the_driver_of_the_seed() -> N
     from xosc_lateral.drivers.model.stream import OffsetStream
 
     stream = OffsetStream(
-        read_profile("motorway-vehicle-3"), Traffic(pipe.traffic._profiles[""], seed=4).seed_of("a"), rate=20.0
+        read_profile("motorway-vehicle-1"), Traffic(pipe.traffic._profiles[""], seed=4).seed_of("a"), rate=20.0
     )
     np.testing.assert_allclose(found, [stream.step({"speed": 30.0, "lane_width": 3.5}) for _ in found], atol=1e-9)
 
@@ -105,7 +105,7 @@ def test_on_a_road_vehicles_see_each_other(tmp_path: Path) -> None:
 
 
 def test_a_pipe_that_breaks_ends_it_cleanly() -> None:
-    words = [sys.executable, "-m", "xosc_lateral", "live", "stdio", "-p", "motorway-vehicle-3", "--verbose"]
+    words = [sys.executable, "-m", "xosc_lateral", "live", "stdio", "-p", "motorway-vehicle-1", "--verbose"]
     with subprocess.Popen(
         words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as run:

@@ -154,7 +154,7 @@ def test_the_state_goes_through_a_file_and_on(profile: DriverProfile) -> None:
     for there, here in zip(*(drive(one, 6.0, 4.33) for one in (traffic, other)), strict=True):
         np.testing.assert_array_equal(here.offset, there.offset)
     with pytest.raises(SimulationError, match="other profiles"):
-        Traffic(read_profile("motorway-vehicle-3")).restore(state)
+        Traffic(read_profile("motorway-vehicle-1")).restore(state)
     with pytest.raises(SimulationError, match="not a state"):
         Traffic(profile).restore({"format": "x"})
 

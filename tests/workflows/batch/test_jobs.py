@@ -249,7 +249,7 @@ def test_a_profile_that_hides_a_shipped_one_is_said_and_makes_other_outputs(data
     assert before.notes == ()
     shutil.copy(SHIPPED / "motorway-vehicle-1.json", team)  # auto does not choose this one
     assert plan_batch([database], tmp_path / "out", settings).jobs == before.jobs
-    shutil.copy(SHIPPED / "motorway-vehicle-2.json", team / "motorway.json")
+    shutil.copy(SHIPPED / "rural.json", team / "motorway.json")
     after = plan_batch([database], tmp_path / "out", settings)
     assert after.notes == (f"{team}/motorway.json hides the shipped profile 'motorway': auto takes it",)
     assert after.jobs[0].fingerprint != before.jobs[0].fingerprint

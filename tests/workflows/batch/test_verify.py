@@ -26,7 +26,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for number in range(4):
         xl.write_template("cut-in", folder / "in" / str(number))
     profile = folder / "mine.json"
-    shutil.copy(shipped_folder("driver_profiles") / "motorway-vehicle-2.json", profile)
+    shutil.copy(shipped_folder("driver_profiles") / "motorway-vehicle-1.json", profile)
     options = {"seed": 3, "time_limit": 4.0, "ego": ["none"], "profile": profile}
     assert xl.convert_many(folder / "in", folder / "out", variants=2, **options).failed == 0
     return folder

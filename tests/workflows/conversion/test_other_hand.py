@@ -9,7 +9,7 @@ import pytest
 from msgspec import structs
 
 from tests.kit.motion import drive, entity, together, two_roads
-from tests.kit.profiles import simulated_profile
+from tests.kit.profiles import REFINED, simulated_profile
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile
@@ -34,7 +34,7 @@ def deviations(
     return {one.name: one.deviation for one in found.entities}
 
 
-@pytest.mark.parametrize("profile", ["motorway", "motorway-refined"])
+@pytest.mark.parametrize("profile", ["motorway", REFINED])
 @pytest.mark.parametrize(("rule", "side"), ROADS)
 def test_left_hand_traffic_is_right_hand_traffic_in_a_mirror(
     tmp_path: Path, rule: str, side: int, profile: str
@@ -47,7 +47,7 @@ def test_left_hand_traffic_is_right_hand_traffic_in_a_mirror(
         assert np.ptp(deviation) > 0.02
 
 
-@pytest.mark.parametrize("profile", ["motorway", "motorway-refined"])
+@pytest.mark.parametrize("profile", ["motorway", REFINED])
 @pytest.mark.parametrize(("rule", "side"), ROADS)
 def test_who_drives_beside_another_keeps_clear_in_either_lane_and_hand(
     tmp_path: Path, rule: str, side: int, profile: str

@@ -2,8 +2,9 @@
 
 Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
 runs; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real snippets of other
-drivers that know as much about the start. Recordings hold driver and sensor, so a profile that knows its sensor is
-compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+drivers that know as much about the start. Recordings hold driver and sensor, so what is sampled has the recording's
+sensor too, where it is known, and both sides are compared in one band: below 1.5 Hz, or below 0.5 Hz, where it is the
+driver who is seen.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation import snippets, spectra
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
@@ -64,11 +66,18 @@ class Beside:
     value: float
     floor: float
     unit: str = "sd"
+    error: float = np.nan  # Standard error of the ratio's logarithm, from random halves of the drives. [-]
 
     @property
     def ratio(self) -> float:
         """Value over that of real drivers; 1: as near as other real drivers. [-]"""
         return self.value / self.floor if self.floor > 0.0 else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of 95 %, of the ratio. [-]"""
+        wide = float(np.exp(NORMAL_95 * self.error))
+        return self.ratio / wide, self.ratio * wide
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +85,7 @@ class ConditionScores:
     """What was found under one condition."""
 
     condition: SnippetCondition
-    with_sensor: bool  # Whether what was sampled holds the profile's sensor.
+    with_sensor: bool  # Whether what was sampled holds a sensor.
     count: int  # Snippets.
     # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `snippets.differences`. With the same start and
     # 10 s, also the proper scores [m].
@@ -117,25 +126,27 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     real = spectra.dithered([run.offset for run in runs], resolution, seed + 2)
     driver = spectra.dithered(driver, resolution, seed + 3)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
-    slow_real, slow_driver = ([spectra.slow_movement(path, step, below) for path in paths] for paths in (real, driver))
+    slow_real, slow_made = ([spectra.slow_movement(path, step, below) for path in paths] for paths in (real, recorded))
     conditions = []
     for seconds in snippets.LENGTHS:
         cut = snippets.snippets_of(runs, seconds, step)
         if len(cut) < MINIMUM_GROUPS or len(np.unique(cut.group)) < 2:
             continue
         slow = SnippetCondition(seconds, False, slow=True, below=below)
-        pairs = [(slow, cut.cut_from(slow_real), cut.cut_from(slow_driver))]
+        pairs = [(slow, cut.cut_from(slow_real), cut.cut_from(slow_made))]
         if below == spectra.STOP_FREQUENCY:  # a recording that is valid to less shows nothing else
             same_start = snippets.sample_snippets(profile, cut, seed + 1, with_sensor=True)
             same = np.array(spectra.dithered(list(same_start), resolution, seed + 4))
-            pairs.insert(0, (SnippetCondition(seconds, False), cut.cut_from(real), cut.cut_from(recorded)))
-            pairs.insert(0, (SnippetCondition(seconds, True), cut.cut_from(real), same))
+            shown = cut.cut_from(real), cut.cut_from(recorded), same
+            measured, free, same = (spectra.in_band(rows, step) for rows in shown)
+            fast = SnippetCondition(seconds, False, below=spectra.RECORDED_BELOW)
+            pairs[:0] = [(replace(fast, same_start=True), measured, same), (fast, measured, free)]
         conditions += [
-            _under(condition, cut, measured, sampled, profile, seed, classify) for condition, measured, sampled in pairs
+            _under(condition, cut, own, sampled, profile, seed, classify) for condition, own, sampled in pairs
         ]
     short = snippets.snippets_of(runs, snippets.LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
-    if conditions and conditions[0].condition == SnippetCondition(snippets.LENGTHS[0], True):
+    if conditions and conditions[0].condition.same_start and conditions[0].condition.seconds == snippets.LENGTHS[0]:
         conditions[0] = _with_proper_scores(conditions[0], profile, short, seed)
     return Realism(
         tuple(conditions), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose)
@@ -156,7 +167,7 @@ def _under(
 ) -> ConditionScores:
     """Scores of one condition; `real` and `sampled` of shape (n, m). [m]"""
     step = profile.model.step
-    highest = spectra.PASS_FREQUENCY / spectra.STOP_FREQUENCY * condition.below if condition.slow else np.inf
+    highest = spectra.PASS_FREQUENCY / spectra.STOP_FREQUENCY * condition.below
     measured = snippets.features_of(real, cut.lane_width, step, highest=highest)
     made = snippets.features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, measured, made, real, cut.group, seed)
@@ -174,8 +185,10 @@ def _under(
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
-    with_sensor, means = profile.sensor is not None and not condition.slow, snippets.named_means(measured, made)
-    return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
+    means = snippets.named_means(measured, made)
+    return ConditionScores(
+        condition, profile.sensor is not None, len(cut), families, named, means, alone, jointly, floor
+    )
 
 
 def _distances(
@@ -208,21 +221,29 @@ def _distances(
 def _beside(
     values: Sequence[Mapping[str, float]], floors: Sequence[Mapping[str, float]], units: Mapping[str, str]
 ) -> dict[str, Beside]:
-    def mean(several: Sequence[Mapping[str, float]], name: str) -> float:
-        return float(np.mean([one[name] for one in several]))
-
-    return {name: Beside(mean(values, name), mean(floors, name), units.get(name, "sd")) for name in values[0]}
+    """Means over random halves; halves differ as much as wholes drawn anew do (delete-half jackknife)."""
+    found = {}
+    for name in values[0]:
+        value, floor = (np.array([one[name] for one in several]) for several in (values, floors))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            error = float(np.log(value / floor).std(ddof=1))
+        found[name] = Beside(float(value.mean()), float(floor.mean()), units.get(name, "sd"), error)
+    return found
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
     """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
     chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED_SNIPPETS)).astype(np.int64))
-    driven, every = cut.offset[chosen], cut.segments
+    begin, every, step = cut.offset[chosen, 0], cut.segments, profile.model.step
     segments = [every[row] for row in chosen]
-    members = [snippets.sample_recorded(profile, segments, driven[:, 0], seed + 10 + k) for k in range(ENSEMBLE_SIZE)]
-    rng, starts = np.random.default_rng(seed), (driven[:, 0], cut.group[chosen], cut.offset[:, 0], cut.group)
+    members = [
+        spectra.in_band(np.array(snippets.sample_recorded(profile, segments, begin, seed + 10 + k)), step)
+        for k in range(ENSEMBLE_SIZE)
+    ]
+    rng, starts = np.random.default_rng(seed), (begin, cut.group[chosen], cut.offset[:, 0], cut.group)
     drivers = snippets.windows_with_the_same_start(*starts, rng, count=ENSEMBLE_SIZE)
-    sampled = proper_scores(driven, np.stack(members, axis=1))
-    real = proper_scores(driven, cut.offset[drivers])
+    seen = spectra.in_band(cut.offset, step)
+    sampled = proper_scores(seen[chosen], np.stack(members, axis=1))
+    real = proper_scores(seen[chosen], seen[drivers])
     added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
     return replace(scores, families={**scores.families, **added})

@@ -7,7 +7,7 @@ the fair measure (`realism`), beside them spectrum, autocorrelation and the lane
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
@@ -150,6 +150,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     """Evaluate a profile on measured runs at its step.
 
     Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s. `classify`: train the classifiers too.
+    The profile's sensor is that of the runs' recording, where it is known (`fitting.driver_runs`).
     """
     step, below = profile.model.step, spectra.comparison_band(runs)
     short = snippets_of(runs, SNIPPET, step)
@@ -159,59 +160,78 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         )
     long = snippets_of(runs, LONG_SNIPPET, step)
     sampled = sample_snippets(profile, short, seed)
+    recorded = sampled if profile.sensor is None else sample_snippets(profile, short, seed, with_sensor=True)
     free = sample_runs(profile, runs, seed + 1)
     widths = [run.lane_width for run in runs]
     offsets = [run.offset for run in runs]
+    real, made = (
+        [spectra.slow_movement(path, step, spectra.RECORDED_BELOW) for path in paths]
+        for paths in (offsets, _recorded(profile, free, seed + 1))
+    )
     lags = [round(lag / step) for lag in LAGS]
+    unbound = sample_runs(profile, runs, seed + 4, same_start=False)
     slow = None
     if below < spectra.STOP_FREQUENCY:
-        unbound = sample_runs(profile, runs, seed + 2, same_start=False)
-        slow = tuple([spectra.slow_movement(path, step, below) for path in paths] for paths in (offsets, unbound))
+        slow = tuple(
+            [spectra.slow_movement(path, step, below) for path in paths]
+            for paths in (offsets, _recorded(profile, unbound, seed + 4))
+        )
 
     def scored(cut: Snippets, made: FloatArray, seconds: float) -> SnippetScores:
-        real = cut.offset
         if slow is not None:
             real, made = (cut.cut_from(paths) for paths in slow)
+        else:
+            real, made = (spectra.in_band(rows, step) for rows in (cut.offset, made))
         return score_snippets(real, made, cut.group, seed=seed, seconds=seconds)
 
     long_scores = None
     if len(long) >= MIN_SNIPPETS and len(np.unique(long.group)) >= 2:
-        long_scores = scored(long, sample_snippets(profile, long, seed + 2), LONG_SNIPPET)
+        long_scores = scored(long, sample_snippets(profile, long, seed + 2, with_sensor=True), LONG_SNIPPET)
     return ProfileScores(
         profile=profile.name,
         drives=len({run.drive for run in runs}),
         runs=len(runs),
         hours=sum(map(len, runs)) * step / 3600.0,
         realism=score_realism(profile, runs, seed=seed + 4, classify=classify),
-        snippets=scored(short, sampled, SNIPPET),
+        snippets=scored(short, recorded, SNIPPET),
         long_snippets=long_scores,
         evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
-        spectrum_real=spectra.spectrum(offsets, step),
-        spectrum_sampled=spectra.spectrum(free, step),
+        spectrum_real=spectra.spectrum(real, step),
+        spectrum_sampled=spectra.spectrum(made, step),
         lags=np.array(LAGS),
-        autocorrelation_real=spectra.autocorrelation(offsets, lags),
-        autocorrelation_sampled=spectra.autocorrelation(free, lags),
+        autocorrelation_real=spectra.autocorrelation(real, lags),
+        autocorrelation_sampled=spectra.autocorrelation(made, lags),
         margins_real=margins(offsets, widths, step),
-        margins_sampled=margins(sample_runs(profile, runs, seed + 4, same_start=False), widths, step),
+        margins_sampled=margins(_recorded(profile, unbound, seed + 4), widths, step),
         traces=_traces(runs, free, step),
         seed=seed,
         below=below,
-        verdict=_verdict(profile, runs, seed),
+        verdict=verdict(profile, runs, seed),
     )
 
 
-def _verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> spectra.Verdict:
-    """Free runs with the profile's sensor beside the measured ones, both at the recording's resolution."""
+def _recorded(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    """Paths as the recording's sensor has them. [m]"""
+    return [path + error for path, error in zip(paths, sensor_noise(profile, paths, seed), strict=True)]
+
+
+LEAST_DRIVES, MOST_TIMES = 60, 8
+"""Sampled for a verdict, as far as so many times the measured ones suffice: what is sampled then adds little chance."""
+
+
+def verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> spectra.Verdict:
+    """Free runs with the recording's sensor beside the measured ones, both at the recording's resolution."""
     step, resolution = profile.model.step, spectra.resolution_of(runs)
-    free = sample_runs(profile, runs, seed + 5, same_start=False)
-    recorded = [path + error for path, error in zip(free, sensor_noise(profile, free, seed + 5), strict=True)]
     drives = {run.drive for run in runs}
-    groups = [run.drive if len(drives) > 1 else f"{run.drive} {run.index}" for run in runs]
-    measured = [
-        replace(run, offset=path)
-        for run, path in zip(runs, spectra.dithered([run.offset for run in runs], resolution, seed + 6), strict=True)
-    ]
-    return spectra.verdict_of(measured, spectra.dithered(recorded, resolution, seed + 7), groups, step)
+    groups = [run.drive if len(drives) > 3 else f"{run.drive} {run.index}" for run in runs]
+    sampled = []
+    for k in range(min(-(-LEAST_DRIVES // len(drives)), MOST_TIMES)):
+        own = seed + 5 + 100 * k
+        free = spectra.dithered(sample_runs(profile, runs, own, same_start=False), resolution, own + 2)
+        sampled.append((free, sensor_noise(profile, free, own)))
+    measured = spectra.dithered([run.offset for run in runs], resolution, seed + 6)
+    limits = [run.valid_below for run in runs if run.valid_below is not None]
+    return spectra.verdict_of(measured, sampled, groups, step, min([np.inf, *limits]))
 
 
 def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> tuple[Trace, ...]:
@@ -237,16 +257,22 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
         "hours": round(scores.hours, 4),
         "verdict": {
             "words": scores.verdict.in_words(),
-            "like_up_to_hz": scores.verdict.like_up_to,
-            "bands": [
+            "driver": scores.verdict.judged(spectra.DRIVER),
+            "recording": scores.verdict.judged(spectra.RECORDING),
+            "compared_below_hz": scores.verdict.highest,
+            "like_up_to_hz": scores.verdict.like_up_to(),
+            "ratios": [
                 {
-                    "low_hz": band.low,
-                    "high_hz": band.high,
-                    "ratio": significant(band.ratio, 3),
-                    "error": round(band.error, 3),
-                    "is_like": band.is_like,
+                    "of": one.of,
+                    "what": one.name,
+                    "low_hz": one.low,
+                    "high_hz": one.high,
+                    "ratio": significant(one.ratio, 3),
+                    "interval": list(all_significant(np.array(one.interval), 3)),
+                    "cause": one.cause,
+                    "judged": one.judged,
                 }
-                for band in scores.verdict.bands
+                for one in scores.verdict.ratios
             ],
             "alarms_per_hour": {
                 f"{speed:g}": {
@@ -320,7 +346,7 @@ def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
     return {
         "seconds": scores.condition.seconds,
         "start": "same" if scores.condition.same_start else "free",
-        "band": f"below {scores.condition.below:g} Hz" if scores.condition.slow else "all",
+        "band": f"below {scores.condition.below:g} Hz",
         "sampled": "driver and sensor" if scores.with_sensor else "driver",
         "count": scores.count,
         "families": {name: {**_beside_to_dict(value), "unit": value.unit} for name, value in scores.families.items()},
@@ -337,7 +363,8 @@ def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
 
 def _beside_to_dict(number: Beside) -> dict[str, float | None]:
     ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
-    return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio}
+    interval = list(all_significant(np.array(number.interval), 3)) if isfinite(number.error) else None
+    return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio, "interval": interval}
 
 
 def _rounded(values: Mapping[str, float]) -> dict[str, float]:

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms, tapered_powers
-from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES
 
 BANDS = np.geomspace(0.01, 1.0, 21)  # Edges of the frequency bands, ten a decade. [Hz]
 # Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds `PERIODS`.
@@ -115,6 +115,15 @@ def slow_movement(path: FloatArray, step: float, stop: float = STOP_FREQUENCY) -
     return filtered(path, low_pass_between(PASS_FREQUENCY / STOP_FREQUENCY * stop, stop, step, ATTENUATION))
 
 
+RECORDED_BELOW = 1.5
+"""Band in which recordings are compared: above, rows at 5 Hz hold what faster ones lose on being resampled. [Hz]"""
+
+
+def in_band(paths: FloatArray, step: float) -> FloatArray:
+    """Paths, shape (n, m) [m], without what is faster than `RECORDED_BELOW`, each by itself."""
+    return np.array([slow_movement(path, step, RECORDED_BELOW) for path in paths]).reshape(paths.shape)
+
+
 def thinned(paths: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:
     """Filtered paths, shape (n, m) [m], at the rate whose half is the beginning of the stop band."""
     return paths[:, :: max(1, round(0.5 / stop / step))]
@@ -137,7 +146,7 @@ def resolution_of(runs: Sequence[Run]) -> float:
 
 
 # ---- up to which frequency sampled movement is like that of other real drivers ----
-BAND_EDGES = (0.04, 0.08, 0.12, 0.16, 0.20, 0.25, 0.32, 0.40, 0.50, 0.70, 1.0, PASS_BAND_EDGES)
+BAND_EDGES = (0.04, 0.08, 0.12, 0.16, 0.20, 0.25, 0.32, 0.40, 0.50, 0.70, 1.0, RECORDED_BELOW)
 """In which power is compared: as wide as windows of 25.6 s resolve, or a quarter of their frequency. [Hz]"""
 
 WINDOW = 25.6  # [s]
@@ -145,21 +154,32 @@ WINDOW = 25.6  # [s]
 TOLERANCE = 1.5
 """Factor by which the power of real drivers differs from run to run (six runs with differential GNSS). [-]"""
 
-ERROR_FACTOR = 2.0  # Standard errors within which a difference may be chance. [-]
-
 ALARM_SPEEDS, ALARM_HOLD = (0.10, 0.15, 0.20), 0.4
 """A plain detector's lateral speeds [m/s], and how long they have to last. [s]"""
 
+ALIKE, UNLIKE, NOT_KNOWN = "alike", "unlike", "not known"
+BOTH = DRIVER, RECORDING = "driver", "recording"
+
+
+def judged(low: float, high: float) -> str:
+    """What the 95 % interval of a ratio says: alike within `TOLERANCE`, unlike beyond it, else not known."""
+    if low >= 1.0 / TOLERANCE and high <= TOLERANCE:
+        return ALIKE
+    return UNLIKE if low > TOLERANCE or high < 1.0 / TOLERANCE else NOT_KNOWN
+
 
 @dataclass(frozen=True)
-class BandPower:
-    """Power of measured and sampled movement in a band."""
+class Ratio:
+    """What is sampled over what is measured, of the driver alone or of the recording, his sensor on both sides."""
 
-    low: float  # [Hz]
-    high: float  # [Hz]
-    measured: float  # [m2/Hz]
-    sampled: float  # [m2/Hz]
-    error: float  # Standard error of the logarithm of their ratio, drives counted as wholes. [-]
+    name: str
+    of: str  # `DRIVER` or `RECORDING`.
+    measured: float
+    sampled: float
+    error: float  # Standard error of the logarithm of the ratio, drives counted as wholes. [-]
+    low: float = 0.0  # Band of a power [Hz]; 0 to 0: all that is compared.
+    high: float = 0.0
+    cause: str = DRIVER  # What most of it is, of the measured: the driver's movement, or the sensor's error.
 
     @property
     def ratio(self) -> float:
@@ -167,37 +187,65 @@ class BandPower:
         return self.sampled / self.measured
 
     @property
-    def is_like(self) -> bool:
-        """Whether real drivers differ by as much, or chance does."""
-        return bool(abs(np.log(self.ratio)) <= max(np.log(TOLERANCE), ERROR_FACTOR * self.error))
+    def interval(self) -> tuple[float, float]:
+        """Of 95 %. [-]"""
+        wide = float(np.exp(NORMAL_95 * min(self.error, 50.0)))
+        return self.ratio / wide, self.ratio * wide
+
+    @property
+    def judged(self) -> str:
+        """See `judged`."""
+        return judged(*self.interval)
+
+    def in_words(self) -> str:
+        """With interval and cause."""
+        return f"{self.name} {self.ratio:.2f} ({self.interval[0]:.2f} to {self.interval[1]:.2f}, {self.cause})"
+
+
+NAMED_RATIOS = 3  # That one line names. [-]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Bands up to what the recording is valid to, and alarms an hour by lateral speed [m/s], measured and sampled."""
+    """Ratios in the band that the recording is valid in, and alarms an hour by lateral speed [m/s], both sides."""
 
-    bands: tuple[BandPower, ...]
+    ratios: tuple[Ratio, ...]
     alarms: Mapping[float, tuple[float, float]]
     shows_alarms: bool  # Whether the recording is valid to where alarms come from.
+    highest: float = RECORDED_BELOW  # Frequency below which both sides are compared. [Hz]
 
-    @property
-    def like_up_to(self) -> float:
-        """Frequency below which every band is like other real drivers'; 0 where the first is not. [Hz]"""
-        first = next((k for k, band in enumerate(self.bands) if not band.is_like), len(self.bands))
-        return self.bands[first - 1].high if first else 0.0
+    def judged(self, of: str) -> str:
+        """The driver, or the recording: unlike if any ratio is, alike if all are, else not known."""
+        mine = [one for one in self.ratios if one.of == of]
+        each = {one.judged for one in mine}
+        if UNLIKE in each:
+            return UNLIKE
+        return ALIKE if each == {ALIKE} and any(one.high for one in mine) else NOT_KNOWN
+
+    def like_up_to(self, of: str = RECORDING) -> float:
+        """Frequency below which the power in every band is alike; 0 where that in the first is not. [Hz]"""
+        powers = [one for one in self.ratios if one.of == of and one.high]
+        first = next((k for k, band in enumerate(powers) if band.judged != ALIKE), len(powers))
+        return powers[first - 1].high if first else 0.0
 
     def in_words(self) -> str:
-        """One line."""
-        if not self.bands:
-            return "no band to compare: runs are too short, or the recording is valid to too little"
-        unlike = next((band for band in self.bands if not band.is_like), None)
-        if unlike is None:
-            return f"power like other real drivers' up to {self.like_up_to:g} Hz, all that is compared"
-        side = "below" if unlike.ratio < 1.0 else "above"
-        what = f"{side} theirs from {unlike.low:g} Hz on ({unlike.ratio:.2f} of it up to {unlike.high:g} Hz)"
-        if self.like_up_to:
-            return f"power like other real drivers' up to {self.like_up_to:g} Hz, {what}"
-        return f"power unlike other real drivers': {what}"
+        """One line: the driver, and the recording."""
+        return "; ".join(self._words(of) for of in BOTH)
+
+    def _words(self, of: str) -> str:
+        mine = [one for one in self.ratios if one.of == of]
+        if not mine:
+            return f"{of} {NOT_KNOWN}: nothing to compare, runs are too short or the recording shows too little"
+        verdict, up_to = self.judged(of), self.like_up_to(of)
+        below = f", power alike up to {up_to:g} Hz" if up_to else ""
+        if verdict == ALIKE:
+            return f"{of} like other real drivers{below}, all that is compared"
+        worst = [one for one in mine if one.judged == verdict] or mine
+        worst.sort(key=lambda one: -abs(np.log(one.ratio)))
+        named = ", ".join(one.in_words() for one in worst[:NAMED_RATIOS])
+        more = f" and {len(worst) - NAMED_RATIOS} more" if len(worst) > NAMED_RATIOS else ""
+        said = f"{of} unlike other real drivers" if verdict == UNLIKE else f"{of} {NOT_KNOWN}"
+        return f"{said}{below}: {named}{more}"
 
     def alarm_words(self) -> str:
         """What a test engineer asks for, in one line."""
@@ -207,21 +255,55 @@ class Verdict:
         return f"alarms an hour at {speeds} m/s to the side for {ALARM_HOLD:g} s: {real}; sampled {sampled}"
 
 
-def verdict_of(runs: Sequence[Run], sampled: Sequence[FloatArray], groups: Sequence[str], step: float) -> Verdict:
-    """Measured runs beside sampled ones, as recorded; `groups` says whose each is, drives or blocks of them. [m]"""
-    limits = [run.valid_below for run in runs if run.valid_below is not None]
-    highest = min([*limits, PASS_BAND_EDGES])
-    measured = [run.offset for run in runs]
+Sampled = Sequence[tuple[Sequence[FloatArray], Sequence[FloatArray]]]
+"""Of each time that the runs were sampled: the driver's paths, and the sensor's errors on them. [m]"""
+
+
+def verdict_of(
+    measured: Sequence[FloatArray], sampled: Sampled, groups: Sequence[str], step: float, highest: float = np.inf
+) -> Verdict:
+    """Measured paths [m] beside sampled ones with the recording's sensor, below the frequency that it is valid to [Hz].
+
+    `groups` says whose each is, drives or blocks of them. The driver is judged where the sensor's error is the smaller
+    part of what was recorded, by what is left without it.
+    """
+    highest = min(highest, RECORDED_BELOW)
     edges = [(low, high) for low, high in pairwise(BAND_EDGES) if high <= highest]
-    real, made = (_powers(paths, groups, edges, step) for paths in (measured, sampled))
-    bands = []
+    recorded = [[path + error for path, error in zip(*each, strict=True)] for each in sampled]
+    every = [path for each in recorded for path in each]
+    of_all = [f"{group} {k}" for k in range(len(sampled)) for group in groups]  # each time by other drivers
+    real, made = _powers(measured, groups, edges, step), _powers(every, of_all, edges, step)
+    errors = _powers([error for _, parts in sampled for error in parts], of_all, edges, step)
+    ratios = [_place(measured, every, groups, of_all)] if groups else []
     for k, (low, high) in enumerate(edges if len(real[0]) else []):
         (density, density_error), (other, other_error) = (_mean(power[:, k], whose) for power, whose in (real, made))
-        bands.append(BandPower(low, high, density, other, float(np.hypot(density_error, other_error))))
+        noise, error = float(errors[0][:, k].mean()) - LEAST_POWER, float(np.hypot(density_error, other_error))
+        name, share = f"power at {low:g} to {high:g} Hz", 1.0 - noise / density
+        if share > 0.5:
+            left = error / share  # what errs by so much of the whole
+            ratios.append(Ratio(name, DRIVER, density - noise, max(other - noise, LEAST_POWER), left, low, high))
+        cause = DRIVER if share > 0.5 else "sensor"
+        ratios.append(Ratio(name, RECORDING, density, other, error, low, high, cause))
     alarms = {
-        speed: (alarms_per_hour(measured, step, speed), alarms_per_hour(sampled, step, speed)) for speed in ALARM_SPEEDS
+        speed: (alarms_per_hour(measured, step, speed), alarms_per_hour(every, step, speed)) for speed in ALARM_SPEEDS
     }
-    return Verdict(tuple(bands), alarms, highest >= BAND_EDGES[-4])
+    return Verdict(tuple(ratios), alarms, highest >= BAND_EDGES[-4], highest)
+
+
+def _place(
+    measured: Sequence[FloatArray], sampled: Sequence[FloatArray], groups: Sequence[str], of_all: Sequence[str]
+) -> Ratio:
+    """Where in the lane: mean square offset about the measured mean, of which a lasting shift is a part."""
+    middle = float(np.concatenate(list(measured)).mean())
+    sides = []
+    for paths, whose in ((measured, groups), (sampled, of_all)):
+        squares = np.concatenate([(path - middle) ** 2 for path in paths])
+        sides.append(_mean(squares, np.repeat(np.array(whose, dtype=np.str_), [len(path) for path in paths])))
+    (real, error), (made, other) = sides
+    return Ratio("mean square about the measured mean", DRIVER, real, made, float(np.hypot(error, other)))
+
+
+LEAST_POWER = 1e-12  # [m2/Hz]
 
 
 def _powers(
@@ -236,15 +318,15 @@ def _powers(
             density = 2.0 * step * periodograms(path, size, detrend=Detrend.ENDS)
             power += [[row[(frequency >= low) & (frequency < high)].mean() for low, high in edges] for row in density]
             whose += [group] * len(density)
-    return np.array(power).reshape(len(power), len(edges)) + 1e-12, np.array(whose, dtype=np.str_)
+    return np.array(power).reshape(len(power), len(edges)) + LEAST_POWER, np.array(whose, dtype=np.str_)
 
 
 def _mean(power: FloatArray, whose: NDArray[np.str_]) -> tuple[float, float]:
     """Mean of windows, shape (n,) [m2/Hz], and the standard error of its logarithm, groups counted as wholes [-]."""
     mean = float(power.mean())
-    sums = [float((power[whose == group] - mean).sum()) for group in np.unique(whose)]
-    count = len(sums)
-    spread = float(np.sqrt(np.square(sums).sum() * count / (count - 1))) if count > 1 else np.inf
+    names, number = np.unique(whose, return_inverse=True)
+    sums, count = np.bincount(number, power - mean), len(names)
+    spread = float(np.sqrt(np.square(sums).sum() * count / (count - 3))) if count > 3 else np.inf  # Student's
     return mean, spread / (len(power) * mean)
 
 

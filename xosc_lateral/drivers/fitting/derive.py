@@ -21,6 +21,7 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
+from xosc_lateral.drivers.fitting.closing import in_words
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.drivers.model.effects.base import FACTOR_LIMIT
@@ -57,7 +58,8 @@ class Derived(NamedTuple):
         if "near_line" in asked and "mean" not in asked and self.asked.size_is_given:
             side = "left" if self.reached.mean > 0 else "right"
             had.append(f"for which he drives {abs(self.reached.mean):.2f} m {side} of the lane's middle")
-        return f"{self.profile.name}: " + ("; ".join(had) or "as its base")
+        lines = [f"{self.profile.name}: " + ("; ".join(had) or "as its base"), in_words(self.profile)]
+        return "\n".join(line for line in lines if line)
 
 
 def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | None = None) -> Derived:
@@ -273,6 +275,8 @@ def _described(
         "reached": reach,
         "speed": round(speed, 3),
     }
+    if (look := base.provenance.fit.get("look")) is not None:
+        fit["look"] = look  # at the base
     if preset is not None:
         notes = f"{preset.what[0].upper()}{preset.what[1:]}. {notes}"
         fit["preset"] = {"name": preset.name, "source": preset.source, "doi": preset.doi}

@@ -16,16 +16,8 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.drive import PAPER_RULES, CutRules, Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import STEP, resample
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
-from xosc_lateral.drivers.fitting.bands import (
-    COMPARED_FREQUENCIES,
-    KEEPING_BAND,
-    SPLIT_AT,
-    density_of,
-    fast_part_of,
-    in_bands,
-    split_by_band,
-)
-from xosc_lateral.drivers.fitting.closing import differences
+from xosc_lateral.drivers.fitting import closing
+from xosc_lateral.drivers.fitting.bands import SPLIT_AT, density_of, fast_part_of
 from xosc_lateral.drivers.fitting.context_effects import (
     LEAST_DRIVES,
     beside_effects,
@@ -33,6 +25,7 @@ from xosc_lateral.drivers.fitting.context_effects import (
     measure_beside,
     without_effects,
 )
+from xosc_lateral.drivers.fitting.joined_bands import COMPARED_FREQUENCIES, KEEPING_BAND, in_bands, split_by_band
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSE_STEP_RATIO,
     PASSED_FREQUENCY,
@@ -89,14 +82,10 @@ def fit_profile(
         known = provenance or Provenance()
         known = replace(known, fit={**known.fit, **_marking_notes(slow)})
         profile = fit_population(runs, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
-        if lacking := differences(profile, runs):
-            known = replace(profile.provenance, fit={**profile.provenance.fit, "not_as_measured": lacking})
-            profile = replace(profile, provenance=known)
         if fast:
             fast_runs, _ = driver_runs(all_runs(fast, rules), fast)
-    else:
-        profile = fit_runs(runs, name=name, model=model, provenance=provenance)
-    return in_bands(profile, runs, fast_runs, prior)
+        return closing.looked_at(in_bands(profile, runs, fast_runs, prior), runs)
+    return in_bands(fit_runs(runs, name=name, model=model, provenance=provenance), runs)
 
 
 def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
@@ -246,16 +235,10 @@ def fit_warnings(
     With a `reference`, of real drivers, also about its band.
     """
     return [
-        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile), *_not_as_measured(profile),
+        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile),
+        *([closing.in_words(profile)] if closing.found_in(profile)[1] else []),
         *([] if reference is None else _band_warnings(profile, reference)),
     ]  # fmt: skip
-
-
-def _not_as_measured(profile: DriverProfile) -> list[str]:
-    """What the closing check found, in one line."""
-    lacking = profile.provenance.fit.get("not_as_measured", {})
-    parts = ", ".join(f"{name} {was:g} becomes {now:g}" for name, (was, now) in lacking.items())
-    return [f"{profile.name} does not drive as its drives do: {parts}"] if parts else []
 
 
 def _beside_given(profile: DriverProfile, stated: float | None) -> list[str]:

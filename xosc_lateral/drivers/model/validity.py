@@ -47,7 +47,7 @@ class Band(Record, frozen=True):
 class Validity(Record, frozen=True):
     """Where a profile is known to hold; what is not stated is not known."""
 
-    bands: Annotated[tuple[Band, ...], Meta(description="Lowest first; above the last one movement is assumed.")] = ()
+    bands: Annotated[tuple[Band, ...], Meta(description="Lowest first; between two, one passes into the other.")] = ()
     speed: Annotated[Interval | None, Meta(description="Least and greatest measured. [m/s]")] = None
     lane_width: Annotated[Interval | None, Meta(description="Least and greatest measured. [m]")] = None
     roads: Annotated[tuple[str, ...], Meta(description='In words: "motorway".')] = ()

@@ -12,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
+from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
 from xosc_lateral.extras.detect.scoring import Case, Curve, Tally, worst_of
 from xosc_lateral.extras.detect.sources import Source
@@ -23,6 +24,12 @@ if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
 
 HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
+FIGURES = {
+    "threshold", "false_alarms_per_hour", "false_alarms_low", "false_alarms_high", "seen", "seen_low", "seen_high",
+    "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high", "lead_median", "lead_5", "lead_95",
+    "lead_median_low", "lead_median_high",
+}  # fmt: skip
+"""Of a row at one threshold."""
 TUNED_HEADINGS = ("source", "detector", "set on", "threshold", *HEADINGS[2:])
 
 
@@ -48,6 +55,16 @@ class Detection(Result):
     def curves(self) -> tuple[Curve, ...]:
         """Of each tally."""
         return tuple(tally.curve() for tally in self.tallies)
+
+    @property
+    def carriers(self) -> list[Carried]:
+        """Detectors with thresholds from homes."""
+        return [detector for tally in self.tallies if isinstance(detector := tally.detector, Carried)]
+
+    @property
+    def is_set(self) -> bool:
+        """Whether every home gave every detector a threshold that meets the goal."""
+        return not not_met(self.carriers)
 
     def headline(self) -> str:
         """See `Result`."""
@@ -77,9 +94,11 @@ class Detection(Result):
                 f"Set on a home: the threshold that gives {self.goal.what} there; a source set on itself has, for each "
                 "vehicle, the threshold of other vehicles."
             )
-            carriers = [detector for tally in self.tallies if isinstance(detector := tally.detector, Carried)]
-            if missed := not_met(carriers):
-                lines.append(f"No threshold gives that, the nearest is set: {', '.join(missed)}.")
+            lines += [f"{missed}." for missed in not_met(self.carriers)]
+        hours = {curve.source: float(curve.hours.sum()) for curve in self.curves}
+        hours |= {one.home.source: one.home.hours for one in self.carriers}
+        if few := [f"{source} ({time:.2f} h)" for source, time in hours.items() if time < 1.0]:
+            lines.append(f"Less than an hour of lane keeping, of which rates an hour are made: {', '.join(few)}.")
         silent = sorted(self.still)
         if silent:
             lines.append(
@@ -107,7 +126,12 @@ class Detection(Result):
     def worst(self) -> list[tuple[str, str, Case]]:
         """Source, detector and case of the worst ones of all."""
         return worst_of(
-            [(tally.source, tally.detector.label(), case) for tally in self.tallies for case in tally.cases]
+            [
+                (tally.source, tally.detector.label(), case)
+                for tally in self.tallies
+                if is_met(tally.detector)
+                for case in tally.cases
+            ]
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,7 +189,7 @@ class Detection(Result):
             detection_page,
             lead=[f"{self.headline()}.", *self.legend()],
             table=[dict(zip(self.headings, cells(row), strict=True)) for row in self.rows()],
-            curves=self.curves,
+            curves=[curve for curve in self.curves if is_met(curve.detector)],
             worst=self.worst(),
             provenance=self.provenance(),
         )
@@ -199,7 +223,14 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
             "lead_median_low": medians[0] if is_set else np.nan,
             "lead_median_high": medians[1] if is_set else np.nan,
         })  # fmt: skip
+    if not is_met(detector):  # figures at a threshold that nothing set would say nothing
+        rows = [row | dict.fromkeys(FIGURES & row.keys(), np.nan) for row in rows]
     return rows
+
+
+def is_met(detector: Detector) -> bool:
+    """Whether its threshold is its own, or from a home that could set it."""
+    return not isinstance(detector, Carried) or detector.home.met
 
 
 def _listed(values: Any) -> list[float | None]:
@@ -221,7 +252,9 @@ def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     seen = _share(row, "seen", "seen_low", "seen_high")
     in_time = _share(row, "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high")
     lead = _with_interval(row, "lead_median", "lead_median_low", "lead_median_high", 2)
-    home = (str(row["home"]), f"{row['threshold']:.3g}") if "home" in row else ()
+    home = () if "home" not in row else (
+        str(row["home"]), f"{row['threshold']:.3g}" if row["home_met"] else "cannot be set here"
+    )  # fmt: skip
     return str(row["source"]), str(row["detector"]), *home, alarms, seen, in_time, lead
 
 

@@ -44,14 +44,23 @@ class Goal:
             return f"at most {self.rate:g} false alarms an hour"
         return f"the fewest false alarms with {self.text} of the cut-ins seen before the marking"
 
-    def number(self, curve: Curve) -> tuple[int, bool]:
-        """Of the threshold that meets it, and whether it does: else the one nearest to it."""
+    def number(self, curve: Curve) -> tuple[int, str]:
+        """Of the threshold that meets it, and why none does it: empty where one does.
+
+        A rate is met where a more sensitive threshold would exceed it. The most sensitive one of all shows nothing of
+        the kind: traffic that raises too few alarms at any threshold sets none.
+        """
         if self.rate is not None:
-            k = curve.tuned(self.rate)
-            return k, bool(curve.sensitive_rate()[k] <= self.rate)
+            k, rates = curve.tuned(self.rate), curve.sensitive_rate()
+            if rates[k] > self.rate:
+                return k, f"{rates[k]:.1f} an hour at least"
+            if k > 0:
+                return k, ""
+            return k, f"{rates[0]:.1f} an hour at any threshold" if rates[0] else "no alarm at any threshold"
         assert self.share is not None
         k = curve.seeing(self.share)
-        return k, bool(curve.in_time[k] >= self.share)
+        seen = float(curve.in_time[k])
+        return k, "" if seen >= self.share else f"{seen:.0%} seen at most"
 
 
 def read_goal(text: str) -> Goal:
@@ -69,10 +78,16 @@ class Home:
 
     source: str
     goal: Goal
-    met: bool
+    why_not: str  # No threshold meets the goal; empty: one does.
     rate: float  # false alarms an hour
     seen: float  # share of cut-ins before the marking; NaN: there are none
+    hours: float = 0.0  # of lane keeping
     is_source: bool = False  # tried on the source itself: each vehicle's threshold comes from other vehicles
+
+    @property
+    def met(self) -> bool:
+        """Whether a threshold meets the goal."""
+        return not self.why_not
 
 
 class Carried(Detector):
@@ -218,8 +233,8 @@ def carried(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: s
         raise NotEnoughDataError(f"{source}: no lane keeping that {detector.name} can be set on")
     if goal.share is not None and not len(curve.leads):
         raise NotEnoughDataError(f"{source}: no cut-in, so that no threshold sees {goal.text} of them")
-    k, met = goal.number(curve)
-    home = Home(source, goal, met, float(curve.rate[k]), float(curve.in_time[k]))
+    k, why_not = goal.number(curve)
+    home = Home(source, goal, why_not, float(curve.rate[k]), float(curve.in_time[k]), float(curve.hours.sum()))
     return Carried(detector, float(curve.detector.limits[k]), home)
 
 
@@ -277,4 +292,4 @@ def _grid(detector: Detector, at_home: Sequence[Scored]) -> FloatArray:
 def not_met(carriers: Collection[Carried]) -> list[str]:
     """Detectors and homes at which no threshold meets the goal, in words."""
     missed = [(one.title(), one.home) for one in carriers if not one.home.met]
-    return sorted({f"{title} on {home.source} ({home.rate:.1f}/h, {home.seen:.0%} seen)" for title, home in missed})
+    return sorted({f"{title} on {home.source}: cannot be set here, {home.why_not}" for title, home in missed})

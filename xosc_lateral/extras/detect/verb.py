@@ -45,3 +45,5 @@ def detect(
         if page is not None:
             result.write_report(page, force=reply.force)
     reply.say(result)
+    if not getattr(result, "is_set", True):  # what was asked for could not be had, and is said above
+        raise typer.Exit(1)

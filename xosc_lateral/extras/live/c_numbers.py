@@ -13,7 +13,7 @@ import numpy as np
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, OFFSET_LANES, TIME, context_range
 from xosc_lateral.base.names import in_c
-from xosc_lateral.base.own_clock import HALF_RATE_SPEED, SPEED_SLACK
+from xosc_lateral.base.own_clock import CLOCK_RATES, CLOCK_SPEEDS, SPEED_SLACK
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import actuator
@@ -107,7 +107,7 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
                                                       "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
         "STEP_PEAK": driver_clock.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         "LARGEST_SINE": paths.LARGEST_SINE,
-        "HALF_RATE_SPEED": HALF_RATE_SPEED, "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
+        "CLOCK_KNOTS": len(CLOCK_SPEEDS), "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}
@@ -115,6 +115,8 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         f"/* Numbers of the profile, written by xosc-lateral {__version__}. */",
         *(f"#define {name} {_number(value)}" for name, value in constants.items()),
         f"#define DRIVER_TWO_LEVEL {int(isinstance(profile.model, TwoLevelModel))}",
+        f"static const double clock_speeds[] = {{{', '.join(map(_number, CLOCK_SPEEDS))}}};",
+        f"static const double clock_rates[] = {{{', '.join(map(_number, CLOCK_RATES))}}};",
         *ziggurats(),
         *core,
         *lines,

@@ -22,9 +22,9 @@ from xosc_lateral.drivers.evaluation.metrics import (
     metric_distances,
     snippet_metrics,
 )
-from xosc_lateral.drivers.fitting.bands import in_bands, measured
 from xosc_lateral.drivers.fitting.context_effects import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
+from xosc_lateral.drivers.fitting.joined_bands import in_bands, measured
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Acts, Effect
 from xosc_lateral.drivers.model.profile import COLUMNS, DriverProfile, Provenance

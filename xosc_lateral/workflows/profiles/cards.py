@@ -14,6 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
+from xosc_lateral.drivers.fitting import closing
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
 from xosc_lateral.files.pages.figure import Figure
@@ -23,7 +24,16 @@ from xosc_lateral.workflows.profiles.effect_words import effect_line
 
 SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
-WRAPPED_ROWS = ("", "valid", "lane", "+-", "source", "licence")  # Rows of a card that are wrapped in the terminal.
+WRAPPED_ROWS = (
+    "",
+    "valid",
+    "lane",
+    "margins",
+    "look",
+    "+-",
+    "source",
+    "licence",
+)  # Rows of a card that are wrapped in the terminal.
 
 
 # ---- the list --------------------------------------------------------------------------------------------------------
@@ -131,6 +141,8 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
+        ("margins", closing.margins_in_words(profile)),
+        ("look", closing.in_words(profile)),
         ("+-", interval_note(profile) if keeping.errors else ""),
         ("fitted on", _amount(known)),
         ("source", known.source),
@@ -178,8 +190,7 @@ def _outcome(known: Provenance) -> Iterator[tuple[str, str]]:
             )
             yield "held out", f"{evaluation.get('held_out', '')}: {scores}"
         if (error := evaluation.get("spectrum_error_db")) is not None:
-            differs = f"the driver alone differs from what was recorded by {error:.1f} dB"
-            yield "spectrum", f"{differs} (rms over frequency bands)"
+            yield "spectrum", f"differs from what was recorded by {error:.1f} dB (rms over frequency bands)"
         if evaluation.get("told_apart"):
             yield "own driver", str(evaluation["told_apart"])
     except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like

@@ -15,6 +15,7 @@ from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.sizes import FAST_S, QUANTITIES, SIGNIFICANCE_LEVEL, SLOW_S, Difference, surest
+from xosc_lateral.drivers.fitting import closing
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -35,7 +36,13 @@ def comparison_text(compared: Compared) -> str:
     )
     lines = [*profiles, f"{FIGURES_NOTE}.", "", *pairs, f"{_distance_note(compared)}."]
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
+    lines += looks_of(compared)
     return "\n".join(lines)
+
+
+def looks_of(compared: Compared) -> list[str]:
+    """What the closing look found at the fit of each, a line each."""
+    return [words for each in compared.profiles if (words := closing.in_words(each.profile))]
 
 
 FIGURES_NOTE = (
@@ -111,6 +118,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "sha256": profile_hash(each.profile),
                 "model": each.profile.model.kind,
                 **figures_record(each.summary, each.keeping),
+                "look": each.profile.provenance.fit.get("look"),
                 "effects": [effect_line(effect) for effect in each.profile.effects],
             }
             for each in compared.profiles
@@ -176,7 +184,7 @@ def comparison_page(compared: Compared) -> str:
     page.section("Which differ")
     page.table([_nowrap(row) for row in pairs])
     note = _distance_note(compared)
-    page.text(f"{note[0].upper()}{note[1:]}.")
+    page.text(f"{note[0].upper()}{note[1:]}.", *(f"{words}." for words in looks_of(compared)))
     more = f"; {len(names) - MAXIMUM_DRAWN} more are left out of the figure" if len(names) > MAXIMUM_DRAWN else ""
     page.figure(
         comparison_figure(compared),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from xosc_lateral.workflows.result import (
 )
 
 if TYPE_CHECKING:
+    from xosc_lateral.drivers.drives.drive import Drive, Run
     from xosc_lateral.drivers.evaluation.realism import Realism
     from xosc_lateral.drivers.evaluation.scores import ProfileScores
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -61,8 +63,22 @@ def evaluate(
     driver = given_profile(profile, library)
     tables = given_drives(drives, columns)
     with naming(tables):
-        scores = score_profile(driver, all_runs(tables.drives), seed=seed, classify=classify)
+        runs = all_runs(tables.drives)
+        scores = score_profile(_seen_with(driver, runs, tables.drives), runs, seed=seed, classify=classify)
     return Evaluation(scores, driver, tables)
+
+
+def _seen_with(driver: DriverProfile, runs: Sequence[Run], drives: Sequence[Drive]) -> DriverProfile:
+    """The profile with the sensor of a recording, as far as it is known; the paper's model knows recordings alone."""
+    from msgspec.structs import replace
+
+    from xosc_lateral.drivers.fitting.fitting import driver_runs
+    from xosc_lateral.drivers.model.core.base import ModelKind
+
+    if driver.model.kind == ModelKind.TWO_LEVEL:
+        return driver
+    _, sensor = driver_runs(runs, drives)
+    return driver if sensor is None else replace(driver, sensor=sensor)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,9 +113,16 @@ class Evaluation(Result):
 
     def headline(self) -> str:
         """One line."""
-        block, ratio = self.worst
         hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
-        return f"{self.profile.name} on {hours}: worst {block}, {ratio:.2f} times that between real drivers"
+        return f"{self.profile.name} on {hours}: " + ", ".join(
+            f"{of} {self.judged(of)}" for of in ("driver", "recording")
+        )
+
+    def judged(self, of: str) -> str:
+        """The "driver", or the "recording", his sensor's error on both sides: "alike", "unlike" or "not known"."""
+        from xosc_lateral.workflows.profiles.evaluation_page import judged
+
+        return judged(self._scores, of)
 
     def __str__(self) -> str:
         from xosc_lateral.workflows.profiles.evaluation_page import evaluation_text

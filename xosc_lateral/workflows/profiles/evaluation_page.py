@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.evaluation import spectra
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.realism import Realism
@@ -64,6 +65,8 @@ NAMED_BLOCKS = 3
 """Blocks that a verdict names."""
 GOOD_RATIO, BAD_RATIO = 1.2, 2.0
 """Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
+Block = tuple[float, float, float, str]
+"""A ratio to what other real drivers get, its 95 % interval, and of what it speaks: driver or recording."""
 
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
@@ -76,7 +79,7 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         scores.verdict.alarm_words(),
         f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
         *realism_lines(scores.realism),
-        "as in the paper: from the same start, without the sensor; real drivers are compared without a common start",
+        "snippets as in the paper, from the same start; real drivers are compared without a common start",
         *_snippet_lines(scores.snippets),
     ]
     if note := start_fade_note(profile):
@@ -107,7 +110,7 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
     """The scores and what is needed to get them again, as plain values."""
     block, ratio = worst_block(scores)
     values = {"worst": {"block": block, "ratio": round(ratio, 3)}, **scores_to_dict(scores)}
-    values["verdict"]["words"] = verdict_in_words(scores)
+    values["verdict"] |= {"words": verdict_in_words(scores)} | {of: judged(scores, of) for of in spectra.BOTH}
     return {**values, "provenance": _provenance(scores, profile, inputs)}
 
 
@@ -137,8 +140,8 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     )
     page.section(
         f"Ten metrics of {scores.snippets.seconds:g} s snippets",
-        "As in the paper: sampled from the same start, without the sensor; real drivers are compared without a common "
-        f"start. {start_fade_note(profile)}",
+        "As in the paper: sampled from the same start; real drivers are compared without a common start. "
+        f"{start_fade_note(profile)}",
     )
     _add_metrics(page, scores.snippets)
     _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
@@ -195,7 +198,8 @@ def _add_realism(page: Page, realism: Realism) -> None:
         "Differences between sampled and measured driving (Wasserstein distances in units of the measured metric's "
         "standard deviation), divided by those between measured drivers: 1 is as close as other real drivers are. "
         "Where sampled snippets start at the measured offset, so do the other drivers'; free runs have no given start. "
-        "Recordings contain the driver and the sensor. A classifier that does not separate sampled from measured "
+        "Recordings contain the driver and the sensor: what is sampled has the recording's sensor added. "
+        "A classifier that does not separate sampled from measured "
         "snippets has an AUC of 0.5; in brackets, the 95 % interval over resampled drives. With context, it also sees "
         "what was around the vehicle; a column that follows from the vehicle's own movement, such as its steering "
         "angle, gives sampled movement away.",
@@ -265,36 +269,55 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
     return figures
 
 
-def blocks_of(scores: ProfileScores) -> dict[str, float]:
+def blocks_of(scores: ProfileScores) -> dict[str, Block]:
     """Every block of the fair measure over what other real drivers get; classifiers: 1 at AUC 0.5, 2 at 1. [-]"""
-    blocks = {}
+    blocks: dict[str, Block] = {}
     for each in scores.realism.conditions:
+        of = spectra.DRIVER if each.condition.slow else spectra.RECORDING
         for family, beside in each.families.items():
             if isfinite(beside.ratio):
-                blocks[f"{FAMILY_LABELS[family]}, {each.condition.name}"] = beside.ratio
+                blocks[f"{FAMILY_LABELS[family]}, {each.condition.name}"] = (beside.ratio, *beside.interval, of)
         for name, area in (("classifier", each.alone), ("classifier with context", each.jointly)):
             if area is not None:
-                blocks[f"{name}, {each.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)
+                ratio, low, high = (1.0 + 2.0 * max(auc - 0.5, 0.0) for auc in (area.auc, area.low, area.high))
+                blocks[f"{name}, {each.condition.name}"] = (ratio, low, high, of)
     return blocks
 
 
 def worst_block(scores: ProfileScores) -> tuple[str, float]:
     """Name and ratio of the block that does worst."""
     blocks = blocks_of(scores)
-    worst = max(blocks, key=blocks.__getitem__)
-    return worst, blocks[worst]
+    worst = max(blocks, key=lambda name: blocks[name][0])
+    return worst, blocks[worst][0]
+
+
+def far_blocks(scores: ProfileScores) -> dict[str, Block]:
+    """Those that are farther from real drivers than these are from each other, beyond `TOLERANCE` and chance.
+
+    They contradict a verdict, and don't confirm one: a block is a distance, near for many reasons.
+    """
+    far = {name: block for name, block in blocks_of(scores).items() if block[1] > spectra.TOLERANCE}
+    return dict(sorted(far.items(), key=lambda item: -item[1][0]))
 
 
 def verdict_in_words(scores: ProfileScores) -> str:
-    """One line from all that is compared: power by frequency, and every block that is far from real drivers."""
-    far = {name: ratio for name, ratio in blocks_of(scores).items() if ratio >= BAD_RATIO}
+    """One line from all that is compared: driver and recording, and every block that is far from real drivers."""
+    far = far_blocks(scores)
     if not far:
         return scores.verdict.in_words()
-    worst = sorted(far, key=far.__getitem__, reverse=True)
-    listed = ", ".join(f"{name} ({far[name]:.2f})" for name in worst[:NAMED_BLOCKS])
+    listed = ", ".join(
+        f"{name} {ratio:.2f} ({low:.2f} to {high:.2f}, {of})"
+        for name, (ratio, low, high, of) in list(far.items())[:NAMED_BLOCKS]
+    )
     more = f" and {len(far) - NAMED_BLOCKS} more" if len(far) > NAMED_BLOCKS else ""
-    what = f"{BAD_RATIO:g} times as far as real drivers are from each other, or more, in"
+    what = "farther from real drivers than these are from each other in"
     return f"{scores.verdict.in_words()}; not like them: {what} {listed}{more}"
+
+
+def judged(scores: ProfileScores, of: str) -> str:
+    """Driver or recording: alike, unlike or not known, by ratios and blocks."""
+    contradicted = any(block[3] == of for block in far_blocks(scores).values())
+    return spectra.UNLIKE if contradicted else scores.verdict.judged(of)
 
 
 def _tone(ratio: float) -> Tone:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 PRIOR_PROFILE = "rural"
 """Profile of the library whose fast movement stands in where a recording shows none: fitted to differential GNSS."""
 
+LEAST_NOISE, MOST_NOISE = 1e-4, 2.0
+"""Of a sensor's error, its standard deviation: a tenth of what the finest recordings resolve, half a lane. [m]"""
+
 
 def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[Drive]:
     """Read and clean drive tables.
@@ -55,7 +58,7 @@ def fit(
     name: Annotated[str, flag(help="Name of the profile; default: the file's name.")] = "",
     source: Annotated[str, flag(help="Description of the drives, for the provenance.")] = "",
     licence: Annotated[str, flag(help="Licence of the drives, for the provenance.")] = "",
-    sensor_noise: Annotated[float | None, flag(min=1e-4, max=2,
+    sensor_noise: Annotated[float | None, flag(min=LEAST_NOISE, max=MOST_NOISE,
         help="Standard deviation of the sensor's error, rounding included [m]; default: estimated.")] = None,
     left_hand: Annotated[bool, flag("--left-hand", help="Drives of left-hand traffic.")] = False,
     neighbours: Annotated[bool | None, flag("--neighbours/--no-neighbours",
@@ -98,6 +101,9 @@ def fit(
     from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
     from xosc_lateral.drivers.model.profile import Provenance
 
+    if sensor_noise is not None and not LEAST_NOISE <= sensor_noise <= MOST_NOISE:
+        known = f"expected {LEAST_NOISE:g} to {MOST_NOISE:g} m, or nothing, where it is to be estimated"
+        raise ValueError(f"sensor_noise of {sensor_noise:g} m: {known}")
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)

@@ -52,7 +52,7 @@ def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
     groups: dict[str, list[ConditionScores]] = {}
     for each in sorted(realism.conditions, key=lambda each: (not each.condition.slow, each.condition.same_start)):
         start = "same start" if each.condition.same_start else "free runs"
-        band = f"below {each.condition.below:g} Hz" if each.condition.slow else "all that was recorded"
+        band = f"below {each.condition.below:g} Hz"
         what = "driver and sensor" if each.with_sensor else "driver"
         groups.setdefault(f"{start}, {band} ({what})", []).append(each)
     return groups

@@ -39,7 +39,7 @@ gives way, which is assumed. [m]"""
 RESPONDING_GAPS = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
 """Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the same quantiles:
 those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
-(`laboratory/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
+(`laboratory/give_way.py`). [m]"""
 
 OVERTAKING_SHARE = 0.84
 """Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,

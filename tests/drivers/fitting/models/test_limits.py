@@ -25,7 +25,7 @@ def _is_flat(path: FloatArray, model: AutoregressiveModel) -> bool:
 
 @pytest.mark.parametrize("seed", [8, 11])  # with limits four standard deviations away: 3 to 4 % of the runs
 def test_drivers_of_few_minutes_seldom_stand_at_a_limit(seed: int) -> None:
-    planted = read_profile("motorway-vehicle-2").model
+    planted = read_profile("motorway-vehicle-1").model
     assert isinstance(planted, AutoregressiveModel)
     measured = sum(replace(planted, limits=(-0.5, 0.5)).stream(np.random.SeedSequence(seed)).take(750))
     fitted = fit_autoregressive([np.asarray(measured)], ["a"])

@@ -754,20 +754,34 @@ static double settle(DRIVER_state *driver, double passed) {
         + driver->from_rate * (1.0 - 18.0 * u * u + 32.0 * pow(u, 3.0) - 15.0 * pow(u, 4.0));
 }
 
-/* Distance driven in a second of the driver's clock. */
-static double way_of(double speed) {
-    return fmax(fabs(speed), (fabs(speed) + HALF_RATE_SPEED) / (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED));
-}
-
 static int is_slow(double speed) {
     return fabs(speed) < MINIMUM_SPEED * (1.0 - SPEED_SLACK);
 }
 
+/* Seconds of the driver's clock in one, by the speed alone: a straight line between two knots. */
+static double clock_rate(double speed) {
+    const double pace = fabs(speed);
+    int k = 0;
+    if (!is_slow(speed)) {
+        return 1.0;
+    }
+    while (k < CLOCK_KNOTS - 2 && pace > clock_speeds[k + 1]) {
+        k++;
+    }
+    return clock_rates[k] + (pace - clock_speeds[k]) * (clock_rates[k + 1] - clock_rates[k])
+        / (clock_speeds[k + 1] - clock_speeds[k]);
+}
+
+/* Distance driven in a second of the driver's clock; below the first knot the rate is in proportion to the speed. */
+static double way_of(double speed) {
+    const double pace = fmax(fabs(speed), clock_speeds[1]);
+    return pace / clock_rate(pace);
+}
+
 /* Seconds of the driver's clock in one: below 40 km/h fewer, and none at rest. */
 static double pace_of(double speed, double own_rate) {
-    const double pace = fabs(speed), rate = pace * (1.0 + HALF_RATE_SPEED / MINIMUM_SPEED) / (pace + HALF_RATE_SPEED);
-    const double turning = LARGEST_SINE * pace / fmax(fabs(own_rate), NEGLIGIBLE_REST);
-    return is_slow(speed) ? fmin(fmin(rate, 1.0), turning) : 1.0;
+    const double turning = LARGEST_SINE * fabs(speed) / fmax(fabs(own_rate), NEGLIGIBLE_REST);
+    return is_slow(speed) ? fmin(clock_rate(speed), turning) : 1.0;
 }
 
 /* On to the next curve, at the end of one, where it is known. */
