@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rates import fitted_rate, rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 from xosc_lateral.drivers.drives.identity import LONGEST_BRIDGE, LONGEST_GAP, leaps
@@ -99,7 +99,7 @@ def _place(
     counts: Counter[str],
 ) -> tuple[EntityMotion, BoolArray] | None:  # fmt: skip
     time, x, y, heading, inferred = _bridged(track, rows)
-    velocity = np.stack([_slope(time, x), _slope(time, y)])
+    velocity = np.stack([fitted_rate(x, time, VELOCITY_WINDOW), fitted_rate(y, time, VELOCITY_WINDOW)])
     heading = _steady_heading(time, x, y, velocity, heading, network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     nearest = network.world_to_lane(x, y, heading=heading)
@@ -146,24 +146,6 @@ def _place(
     return motion, inferred[best]
 
 
-def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Rate of change at each row, by least squares over `VELOCITY_WINDOW`; shape (n,)."""
-    if len(time) < 2:
-        return np.zeros(len(time))
-    half = 0.5 * VELOCITY_WINDOW + 1e-6
-    first = np.minimum(np.searchsorted(time, time - half), np.maximum(np.arange(len(time)) - 1, 0))
-    last = np.maximum(np.searchsorted(time, time + half), np.minimum(np.arange(len(time)) + 2, len(time)))
-    t, v = time - time.mean(), values - values.mean()
-
-    def total(terms: FloatArray) -> FloatArray:
-        sums = np.r_[0.0, np.cumsum(terms)]
-        return np.asarray(sums[last] - sums[first])
-
-    count = (last - first).astype(np.float64)
-    spread = count * total(t * t) - total(t) ** 2
-    return np.asarray((count * total(t * v) - total(t) * total(v)) / spread)
-
-
 def _steady_heading(
     time: FloatArray, x: FloatArray, y: FloatArray, velocity: FloatArray, heading: FloatArray, network: RoadNetwork
 ) -> FloatArray:
@@ -204,7 +186,13 @@ def _bridged(
     from scipy.interpolate import CubicHermiteSpline
 
     parts = np.split(np.arange(len(rows)), np.flatnonzero(step > LONGEST_GAP) + 1)
-    velocity = np.concatenate([np.stack([_slope(time[p], x[p]), _slope(time[p], y[p])]) for p in parts], axis=1)
+    velocity = np.concatenate(
+        [
+            np.stack([fitted_rate(x[p], time[p], VELOCITY_WINDOW), fitted_rate(y[p], time[p], VELOCITY_WINDOW)])
+            for p in parts
+        ],
+        axis=1,
+    )
     new = []
     for k in np.flatnonzero(gaps).tolist():
         at = time[k] + usual * np.arange(1, int(np.ceil(step[k] / usual - 1e-6)))
