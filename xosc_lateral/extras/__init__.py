@@ -49,7 +49,5 @@ CALLS = {
 
 SERVICES = {
     "read_maneuvers": "extras.recordings.maneuvers",
-    "recognised": "extras.recordings.importers.foreign_table",
-    "mapping_text": "extras.recordings.importers.foreign_table",
 }
 """What verbs of the core ask for -> module that has it."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.note import Note, Telling, rows_left_out
+from xosc_lateral.base.note import Note, Telling, rows_left_out, warnings
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.options import paths as as_paths
@@ -118,8 +118,14 @@ class GivenDrives:
 
     @property
     def messages(self) -> tuple[Note, ...]:
-        """Rows that are left out."""
-        return rows_left_out(self.left_out)
+        """Rows that are left out, and what the drives say against themselves."""
+        return (*rows_left_out(self.left_out), *warnings(self.evidence()))
+
+    def evidence(self) -> list[str]:
+        """What the drives say against themselves, in lines; see `drivers.drives.evidence`."""
+        from xosc_lateral.drivers.drives.evidence import of_drives
+
+        return of_drives([drive.offset for drive in self.drives], [drive.lane_width for drive in self.drives])
 
     def valid_below(self, frequency: float | None) -> GivenDrives:
         """The same, where drives that don't state their band show driving below a frequency [Hz]."""

@@ -246,7 +246,8 @@ def fit_warnings(
     With a `reference`, of real drivers, also about its band.
     """
     return [
-        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile), *_not_as_measured(profile),
+        *profile.provenance.fit.get("evidence", ()), *_beside_given(profile, sensor_noise), *_coarse_steps(profile),
+        *_strained(profile), *_not_as_measured(profile),
         *([] if reference is None else _band_warnings(profile, reference)),
     ]  # fmt: skip
 

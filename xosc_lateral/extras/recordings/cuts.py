@@ -168,6 +168,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
     meant = {
         "in degrees, heading=COLUMN:deg": np.radians(heading),
         "the opposite direction": heading + np.pi,
+        "counted from y": heading + 0.5 * np.pi,
         CLOCKWISE: -heading,
         NORTH: 0.5 * np.pi - heading,
         "in degrees, " + CLOCKWISE: -np.radians(heading),

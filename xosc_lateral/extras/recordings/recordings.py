@@ -180,7 +180,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     heading = tracks.heading - network.header_offset.heading
     every = slice(None, None, max(1, len(x) // GATE_ROWS))
     place = require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    shift = of_registration(*place, tracks.vehicle[every])
+    shift = of_registration(*place, tracks.vehicle[every], heading[every])
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
     label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""

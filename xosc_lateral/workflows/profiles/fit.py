@@ -102,12 +102,13 @@ def fit(
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns).valid_below(valid_below)
     by_default = isinstance(prior, str) and prior == PRIOR_PROFILE
+    lines = tables.evidence()
     with naming(tables):
         known = Provenance(
             source=source or ", ".join(tables.inputs),
             licence=licence,
             inputs=dict(tables.inputs),
-            fit=summary_of(tables.drives, tables.left_out),
+            fit=summary_of(tables.drives, tables.left_out) | ({"evidence": lines} if lines else {}),
         )
         profile = fit_profile(
             tables.drives,
