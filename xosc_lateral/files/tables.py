@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 PARQUET = ".parquet"
 FEATHER = (".feather", ".arrow")
+MOST_LINES = 500  # of a text, that show whether ids begin with 0
+ID_HEADER = re.compile("(id|vin|drive|vehicle|trip|track|session|ride|case)$")
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
@@ -82,10 +84,20 @@ def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv
         text.seek(layout.start)
         separator = layout.separator or _separator(text, path, layout.start)
         csv |= {"skiprows": skipped} if skipped else {}
+        if "dtype" not in csv:
+            csv["dtype"] = _texts_of_digits(head[layout.start :], separator)
         table = _in_parts(text, layout.start, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
         table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
         table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
+
+
+def _texts_of_digits(head: bytes, separator: str) -> dict[str, type[str]]:
+    """Columns of ids such as 007, which are no numbers, by the file's beginning."""
+    lines = head.decode("utf-8-sig", "replace").splitlines()[:MOST_LINES]
+    names, *rows = ([cell.strip(' "') for cell in line.split(separator)] for line in lines or [""])
+    ids = (k for k, name in enumerate(names) if ID_HEADER.search(name.lower()))
+    return {names[k]: str for k in ids if any(re.fullmatch(r"0\d+", row[k]) for row in rows if len(row) > k)}
 
 
 def _in_parts(text: IO[bytes], start: int, **csv: Any) -> pd.DataFrame:

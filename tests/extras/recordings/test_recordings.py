@@ -71,8 +71,13 @@ def test_a_curve_is_written_to_the_millimetre(tmp_path):
 
 
 def test_formats_are_told_from_names(tmp_path):
-    names = {"tasi.whl": "dlr-ht", "trajectories_2.csv": "dlr-ht", "01_tracks.csv": "levelx", "a_gt.mcap": "osi"}
-    assert {name: format_of(Path(name)) for name in names} == names
+    for name in ("01_tracks.csv", "01_recordingMeta.csv", "sind_tracks.csv"):
+        (tmp_path / name).touch()
+    names = {
+        "tasi.whl": "dlr-ht", "trajectories_2.csv": "dlr-ht", "01_tracks.csv": "levelx", "sind_tracks.csv": "tracks",
+        "a_gt.mcap": "osi",
+    }  # fmt: skip
+    assert {name: format_of(tmp_path / name) for name in names} == names
     assert format_of(Path("tracks.parquet")) == "tracks"
     assert format_of(tmp_path) == "levelx"
 

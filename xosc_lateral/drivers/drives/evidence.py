@@ -36,6 +36,7 @@ UNIT_SIZES = {"cm": 1e2, "mm": 1e3, "ft": 1.0 / 0.3048, "km": 1e-3}
 ALTERNATING = 2.0
 """White noise differs from row to row as over several rows (1), driving less; two vehicles in turns more. [-]"""
 MOST_IN_TURNS = 8
+LEAST_APART = 0.05  # vehicles nearer to each other do little harm as one; the error of a filter may look like two [m]
 FASTEST_STEP, SLOWEST_STEP = 9.5e-4, 2.0  # 1 kHz and its jitter; what comes every 2 s shows no movement in a lane [s]
 FASTEST_CLOCK = 0.02  # rows farther apart are not minutes: they would be 1.2 s and more apart [s]
 MINUTES_WINDOW = 0.25  # 15 s in minutes: noise is averaged out over it, and a driver has moved [s]
@@ -104,7 +105,7 @@ def in_turns(values: FloatArray) -> int:
     if len(known) < 100:
         return 1
     apart = [float(np.median(np.abs(known[k:] - known[:-k]))) for k in range(1, MOST_IN_TURNS + 1)]
-    return next((k for k, change in enumerate(apart, start=1) if apart[0] > ALTERNATING * change), 1)
+    return next((k for k, change in enumerate(apart, start=1) if apart[0] > max(ALTERNATING * change, LEAST_APART)), 1)
 
 
 def of_clock(time: FloatArray, slowest: float = SLOWEST_STEP, *, is_named: bool = False) -> str | None:

@@ -19,6 +19,7 @@ from xosc_lateral.extras.recordings.recordings import (
     REAR_AXLE,
     USUAL_WIDTH,
     RecordedTraffic,
+    format_of,
     read_recordings,
 )
 from xosc_lateral.files.held import Held, exists
@@ -113,10 +114,7 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
-    name = path.name.lower()
-    is_table = (
-        name.endswith(TABLE_SUFFIXES) and not name.endswith("_tracks.csv") and not name.startswith("trajectories")
-    )
+    is_table = path.name.lower().endswith(TABLE_SUFFIXES) and format_of(path) == "tracks"
     said = dict[str, None]()
     if is_table and settings.road is None:
         read = lambda: _driven(given_drives(path, settings.columns), said)  # noqa: E731

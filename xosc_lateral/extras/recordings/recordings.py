@@ -106,11 +106,11 @@ def _composed(track: RecordedTrack) -> RecordedTrack:
 
 
 def format_of(source: Path) -> str:
-    """A recording's format by its name; a table, where nothing else fits."""
+    """A recording's format by its name and what lies beside it; a table, where nothing else fits."""
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
         return "dlr-ut" if "urban" in name else "dlr-ht"
-    if (source.is_dir() and any(source.glob("*_tracks.csv"))) or _is_levelx(source):
+    if any(map(_is_levelx, source.glob("*_tracks.csv"))) if source.is_dir() else _is_levelx(source):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
@@ -158,9 +158,9 @@ def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 
 
 def _is_levelx(source: Path) -> bool:
-    """A recording of levelX has its meta beside it."""
+    """A recording of levelX has its meta beside it: others call their tracks the same."""
     name = source.name
-    return name.lower().endswith("_tracks.csv") and source.with_name(f"{name[:-10]}_recordingMeta.csv").exists()
+    return name.endswith("_tracks.csv") and source.with_name(name.replace("_tracks.csv", "_recordingMeta.csv")).exists()
 
 
 def name_of(source: Path) -> str:
@@ -273,7 +273,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
     table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
-    if recording.is_exid:
+    if "xCenter" in table.columns:  # exiD, inD, rounD, uniD
         kinds = recording.classes(meta.set_index("trackId").reindex(table["trackId"]))
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
