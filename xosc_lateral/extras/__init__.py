@@ -49,5 +49,6 @@ CALLS = {
 
 SERVICES = {
     "read_maneuvers": "extras.recordings.maneuvers",
+    "drives_of": "extras.recordings.recordings",
 }
 """What verbs of the core ask for -> module that has it."""

@@ -61,8 +61,9 @@ MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds l
 
 
 def read_drives(
-    paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None, lost: Counter[str] | None = None
-) -> list[Drive]:
+    paths: str | Path | Sequence[str | Path | Drive], mapping: MappingLike | None = None,
+    lost: Counter[str] | None = None,
+) -> list[Drive]:  # fmt: skip
     """Read the drives of one or several tables, in the order of the files and of first appearance.
 
     `mapping`: what columns are called, and how tables are written, see `files.mapping`. A drive without a name is
@@ -70,12 +71,15 @@ def read_drives(
     `lost` counts those in no drive, by reason.
     """
     known = as_mapping(mapping)
-    files = inputs_of([paths] if isinstance(paths, str | Path) else paths)
-    if twice := {str(path) for path in files if files.count(path) > 1}:
+    every = [paths] if isinstance(paths, str | Path) else paths
+    files = [path for one in every for path in ([one] if isinstance(one, Drive) else inputs_of([one]))]
+    named = [path for path in files if not isinstance(path, Drive)]
+    if twice := {str(path) for path in named if named.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
-    return with_distinct_names(
-        [drive for path in files for drive in drives_of_table(read_table(path, known), known, path, lost)]
-    )
+    read = list[Drive]()
+    for one in files:
+        read += [one] if isinstance(one, Drive) else drives_of_table(read_table(one, known), known, one, lost)
+    return with_distinct_names(read)
 
 
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
@@ -120,6 +124,7 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
     if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
         needed = "needs distance_left and distance_right, or offset and lane_width"
         what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+        what += "; x and y are in lanes with a road: fit --road, import tracks" if {"x", "y"} <= columns.keys() else ""
         raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     every = list(rows_of_drives(table, path))

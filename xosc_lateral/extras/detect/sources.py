@@ -114,7 +114,7 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
-    is_table = path.name.lower().endswith(TABLE_SUFFIXES) and format_of(path) == "tracks"
+    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and format_of(path) == "tracks"
     said = dict[str, None]()
     if is_table and settings.road is None:
         read = lambda: _driven(given_drives(path, settings.columns), said)  # noqa: E731

@@ -14,7 +14,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import require_along_lanes
-from xosc_lateral.extras.recordings.importers import dlr_ht, dlr_ut, levelx
+from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
@@ -24,6 +24,7 @@ from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.opendrive.write import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
+from xosc_lateral.files.source import read_source
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
@@ -105,6 +106,12 @@ def _composed(track: RecordedTrack) -> RecordedTrack:
     return replace(track, name=name, entity=structs.replace(track.entity, name=name))
 
 
+def drives_of(source: Path, road: Path, columns: MappingLike | None = None) -> ImportedDrives:
+    """The drives of a recording on a road."""
+    kind = format_of(source)
+    return import_drives(kind, source, road=road, **({"mapping": columns} if kind == "tracks" else {}))
+
+
 def format_of(source: Path) -> str:
     """A recording's format by its name and what lies beside it; a table, where nothing else fits."""
     name = source.name.lower()
@@ -171,7 +178,7 @@ def name_of(source: Path) -> str:
 def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
     """`made`: OpenDRIVE of the recording's own lanes, for where no road is given."""
     if road is not None:
-        network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
+        network, data, road_name = read_opendrive(road), read_source(road).data, road.name
     elif made is not None:
         network, data, road_name = parse_opendrive(made, name_of(source)), made, f"{name_of(source)}.xodr"
     else:
