@@ -120,13 +120,21 @@ def test_a_drive_that_came_from_nowhere_has_no_name_to_put_before_it() -> None:
 
 
 FORMS = {
-    "path": lambda path: path, "text": str, "list": lambda path: [path], "URL": lambda path: path.as_uri(),
-    "pattern": lambda path: str(path.parent / "driv*.csv"), "folder": lambda path: path.parent / "parts",
-    "bytes": lambda path: path.read_bytes(), "frame": pd.read_csv,
+    "path": lambda path: path,
+    "text": str,
+    "list": lambda path: [path],
+    "URL": lambda path: path.as_uri(),
+    "pattern": lambda path: str(path.parent / "driv*.csv"),
+    "folder": lambda path: path.parent / "parts",
+    "folder of CSV": lambda path: path.parent / "csv",
+    "bytes": lambda path: path.read_bytes(),
+    "frame": pd.read_csv,
     "dict": lambda path: pd.read_csv(path).to_dict("list"),
-    "Arrow": lambda path: pa.table(dict(pd.read_csv(path))), "Drive": lambda path: xl.read_drives(path)[0],
-    "Drives": lambda path: xl.read_drives(path), "result": lambda path: xl.import_drives("table", path),
-}  # fmt: skip
+    "Arrow": lambda path: pa.table(dict(pd.read_csv(path))),
+    "Drive": lambda path: xl.read_drives(path)[0],
+    "Drives": lambda path: xl.read_drives(path),
+    "result": lambda path: xl.import_drives("table", path),
+}
 """What stands for drives, made of the path of their table."""
 
 VERBS = {
@@ -144,7 +152,9 @@ def long_table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("forms")
     made = xl.sample("motorway", duration=240.0, speed=30.0, seed=1).to_frame()
     made.assign(lane_width=3.6, speed=30.0).to_csv(folder / "drive.csv", index=False)
-    (folder / "parts").mkdir()
+    for name in ("parts", "csv"):
+        (folder / name).mkdir()
+    (folder / "csv" / "drive.csv").write_bytes((folder / "drive.csv").read_bytes())
     made.assign(lane_width=3.6, speed=30.0).to_parquet(folder / "parts" / "drive.parquet")
     return folder / "drive.csv"
 

@@ -118,11 +118,18 @@ def _is_filler(name: str, column: pd.Series) -> bool:
     return name.startswith("Unnamed: ") and bool(column.isna().all())
 
 
+def tables_at(path: Path) -> list[Path]:
+    """The table of a path; of a folder, itself where it holds Parquet files, its parts, else all that are in it."""
+    if not path.is_dir() or any(path.rglob(f"*{PARQUET}")):
+        return [path]
+    return sorted(one for one in path.iterdir() if one.name.lower().endswith(TABLE_SUFFIXES)) or [path]
+
+
 def _parts(folder: Path) -> pd.DataFrame:
     """The table whose parts are the Parquet files of a folder, whose names of folders (``drive=7``) are columns."""
     files = sorted(folder.rglob(f"*{PARQUET}"))
     if not files:
-        raise FormatError(f"holds no table (*{PARQUET})", path=folder)
+        raise FormatError(f"holds no table ({', '.join(TABLE_SUFFIXES)})", path=folder)
     parts = []
     for file in files:
         keys = (part.partition("=") for part in file.relative_to(folder).parts[:-1])

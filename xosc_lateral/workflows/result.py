@@ -181,6 +181,7 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None, road: P
     """
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import read_drives
+    from xosc_lateral.files.tables import tables_at
     from xosc_lateral.workflows.inputs import several
     from xosc_lateral.workflows.opened import opened, opened_as_one
 
@@ -191,6 +192,8 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None, road: P
         for number, item in enumerate(items, start=1)
         for one in ([item] if isinstance(item, Drive) else opened(item, label.format(number)))
     ]
+    if road is None:
+        given = [each for one in given for each in ([one] if isinstance(one, Drive) else tables_at(one))]
     paths = [one for one in given if not isinstance(one, Drive)]
     tables, mapping = given, columns
     if (on := None if road is None else opened_as_one(road, name="road")) is not None:

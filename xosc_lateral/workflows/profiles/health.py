@@ -19,7 +19,7 @@ from xosc_lateral.base.note import Note, rows_left_out, warnings
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
 from xosc_lateral.files.recognised import mapping_text, recognised
-from xosc_lateral.files.tables import read_table
+from xosc_lateral.files.tables import read_table, tables_at
 from xosc_lateral.workflows.opened import opened
 from xosc_lateral.workflows.options import Paths, declare_options
 from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, given_drives, write_page
@@ -46,7 +46,8 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     FormatError
         Only where there is no table at all: what is wrong with one is part of the result.
     """
-    files, stated = tuple(opened(drives, "DataFrame")), as_mapping(columns)
+    files = tuple(each for one in opened(drives, "DataFrame") for each in tables_at(one))
+    stated = as_mapping(columns)
     seen, left = recognised([read_table(path, stated) for path in files], files[-1])
     proposal = mapping_text(files, stated, seen, left)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))

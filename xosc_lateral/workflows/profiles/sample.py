@@ -78,7 +78,7 @@ def sample(
         return Offsets(driver, made, seed, None, settings, messages)
     tables = None if context is None else _context_alone(context, driver, lane_width, columns)
     if tables is None:
-        tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+        tables = given_drives(like if like is not None else context, columns)
     drives = tables.drives
     if like is not None:
         with naming(tables):

@@ -15,14 +15,14 @@ from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, paths_of
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.files.tables import read_table
+from xosc_lateral.files.tables import read_table, tables_at
 
 
 def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> ImportedDrives:
     """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
     again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
     """
-    known, files = as_mapping(mapping), paths_of(sources)
+    known, files = as_mapping(mapping), [table for path in paths_of(sources) for table in tables_at(path)]
     made, lost, drives = list[pd.DataFrame](), Counter[str](), list[Drive]()
     for path, label in zip(files, file_labels(files), strict=True):
         read = read_table(path, known)
