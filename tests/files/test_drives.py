@@ -156,7 +156,7 @@ BAD = {
         r"offsets of up to 20 m in a lane of 3\.5 m, 100 % of the rows",
     ),
     "lane in cm": (changed(offset=0.0, lane_width=350.0), FormatError, r"lane is 350 m wide \(median\)"),
-    "speed in km/h": (changed(speed=120.0), FormatError, r"speed is 120 m/s \(median\), more than 50; .*km/h"),
+    "speed in km/h": (changed(speed=120.0), FormatError, r"is 120 m/s \(median\), more than 50; .*km/h"),
     "time in ms": (changed(time=table().time * 1000), FormatError, r"rows are 50 s apart \(median\).*:ms"),
     "too sparse": (table(rate=2.0), FormatError, r"rows are 0\.5 s apart"),
     "two drives in one": (
@@ -283,3 +283,20 @@ def test_words_that_change_on_the_way_are_categories_and_names_are_not(tmp_path:
     first, _ = read_drives(tmp_path / "mine.csv")
     assert {"surface=dry", "surface=wet"} <= first.levels
     assert not any("driver" in name for name in first.context)
+
+
+def test_ids_that_begin_with_0_keep_it(tmp_path: Path) -> None:
+    made = pd.concat([table().assign(drive_id=name) for name in ("007", "7", "070")])
+    made.to_csv(tmp_path / "a.csv", index=False)
+    assert [drive.name for drive in read_drives(tmp_path / "a.csv")] == ["007", "7", "070"]
+
+
+def test_one_fast_car_among_others_is_no_wrong_unit_and_alone_says_its_own(tmp_path: Path) -> None:
+    fast = table().assign(speed=54.0, drive="fast")
+    others = [table().assign(drive=name) for name in "ab"]
+    pd.concat([fast, *others]).to_csv(tmp_path / "a.csv", index=False)
+    assert len(read_drives(tmp_path / "a.csv")) == 3
+    fast.to_csv(tmp_path / "b.csv", index=False)
+    with pytest.raises(FormatError, match="else speed=COLUMN:m/s"):
+        read_drives(tmp_path / "b.csv")
+    assert np.median(read_drives(tmp_path / "b.csv", parse_map(["speed=speed:m/s"]))[0].speed) == 54.0

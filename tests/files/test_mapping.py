@@ -180,7 +180,7 @@ HEADERS_IN_USE = {
 
 @pytest.mark.parametrize(("name", "header"), [(name, one) for name, every in HEADERS_IN_USE.items() for one in every])
 def test_headers_of_the_usual_systems_are_proposed(name: str | None, header: str, tmp_path: Path) -> None:
-    from xosc_lateral.extras.recordings.importers.foreign_table import propose_mapping
+    from xosc_lateral.files.recognised import propose_mapping
 
     path = tmp_path / "t.csv"
     path.write_text(f"time,{header}\n" + "".join(f"{0.1 * k},{1.7 + 0.01 * k}\n" for k in range(50)))

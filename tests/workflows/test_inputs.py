@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 import xosc_lateral as xl
+from tests.kit.jam import ROAD, jam
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError, XoscLateralError
 from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.workflows.result import as_paths, frame_hash, given_drives, given_profile, naming
+from xosc_lateral.workflows.result import as_paths, given_drives, given_profile, naming
 
 SECONDS = 40.0
 
@@ -51,7 +53,7 @@ def test_a_path_its_name_its_frame_and_its_drive_are_the_same_drive(table: Path)
 def test_a_file_is_named_with_the_hash_of_its_bytes_and_a_frame_with_one_of_its_values(table: Path) -> None:
     given = given_drives([table, frame(seed=2)])
     assert given.inputs["drive.csv"] == hashlib.sha256(table.read_bytes()).hexdigest()
-    assert given.inputs["DataFrame 2"] == frame_hash(frame(seed=2))
+    assert given.inputs["DataFrame 2"] == given_drives(frame(seed=2)).inputs["DataFrame"]
     assert given.files == (table,)
     assert given_drives(frame()).inputs.keys() == {"DataFrame"}
 
@@ -86,7 +88,8 @@ def test_columns_of_other_names_and_units_are_read_as_what_they_are(table: Path)
     ids=["itself", "a copy", "a micrometre", "another name", "a column less", "another order", "a row less"],
 )
 def test_the_hash_of_a_frame_changes_with_whatever_is_in_it(change, alike: bool) -> None:
-    assert (frame_hash(change(frame())) == frame_hash(frame())) is alike
+    (hashed,), (plain,) = (given_drives(one).inputs.values() for one in (change(frame()), frame()))
+    assert (hashed == plain) is alike
 
 
 @pytest.mark.parametrize(("rows", "verb"), [(1, xl.read_drives), (60, lambda path: xl.fit(path, name="made"))])
@@ -114,6 +117,67 @@ def test_a_drive_that_came_from_nowhere_has_no_name_to_put_before_it() -> None:
     assert (dict(given.inputs), given.files) == ({}, ())
     with pytest.raises(NotEnoughDataError, match=r"^no turn$"), naming(given):
         raise NotEnoughDataError("no turn")
+
+
+FORMS = {
+    "path": lambda path: path,
+    "text": str,
+    "list": lambda path: [path],
+    "URL": lambda path: path.as_uri(),
+    "pattern": lambda path: str(path.parent / "driv*.csv"),
+    "folder": lambda path: path.parent / "parts",
+    "folder of CSV": lambda path: path.parent / "csv",
+    "bytes": lambda path: path.read_bytes(),
+    "frame": pd.read_csv,
+    "dict": lambda path: pd.read_csv(path).to_dict("list"),
+    "Arrow": lambda path: pa.table(dict(pd.read_csv(path))),
+    "Drive": lambda path: xl.read_drives(path)[0],
+    "Drives": lambda path: xl.read_drives(path),
+    "result": lambda path: xl.import_drives("table", path),
+}
+"""What stands for drives, made of the path of their table."""
+
+VERBS = {
+    "read_drives": lambda drives, coarse: xl.read_drives(drives),
+    "check": lambda drives, coarse: xl.check(drives).read.drives,
+    "sample": lambda drives, coarse: xl.sample(coarse, like=drives),
+    "evaluate": lambda drives, coarse: xl.evaluate(coarse, drives, classify=False),
+    "detect": lambda drives, coarse: xl.detect(drives, detectors="lateral-speed").tallies,
+    "import": lambda drives, coarse: xl.import_drives("table", drives),
+}
+
+
+@pytest.fixture(scope="module")
+def long_table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("forms")
+    made = xl.sample("motorway", duration=240.0, speed=30.0, seed=1).to_frame()
+    made.assign(lane_width=3.6, speed=30.0).to_csv(folder / "drive.csv", index=False)
+    for name in ("parts", "csv"):
+        (folder / name).mkdir()
+    (folder / "csv" / "drive.csv").write_bytes((folder / "drive.csv").read_bytes())
+    made.assign(lane_width=3.6, speed=30.0).to_parquet(folder / "parts" / "drive.parquet")
+    return folder / "drive.csv"
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_verb_takes_drives_in_every_form(long_table: Path, form: str) -> None:
+    coarse = xl.read_profile("rural")
+    for verb, call in VERBS.items():
+        assert call(FORMS[form](long_table), coarse), verb
+
+
+@pytest.mark.parametrize("form", ["path", "URL", "bytes", "frame", "result"])
+def test_a_recording_and_its_road_are_taken_in_every_form(tmp_path: Path, form: str) -> None:
+    """And wherever drives are wanted."""
+    table, _ = jam(1, 0.0, vehicles=6, lasting=60.0)
+    table.to_csv(tmp_path / "rec.csv", index=False)
+    (tmp_path / "road.xodr").write_text(ROAD)
+    recording = FORMS["frame" if form == "result" else form](tmp_path / "rec.csv")
+    road = FORMS["path" if form in ("frame", "result") else form](tmp_path / "road.xodr")
+    assert len(xl.reconstruct(recording, road=road).to_frame()) == 6
+    made = xl.import_drives("tracks", recording, road=road)
+    drives = given_drives(recording, road=road).drives
+    assert sum(map(len, drives)) == len(made.to_frame())
 
 
 # ---- profiles, paths, roads ------------------------------------------------------------------------------------------

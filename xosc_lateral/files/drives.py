@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,8 +61,9 @@ MAX_LEVELS = 12  # a column of whole numbers with at most so many values holds l
 
 
 def read_drives(
-    paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None, lost: Counter[str] | None = None
-) -> list[Drive]:
+    paths: str | Path | Sequence[str | Path | Drive], mapping: MappingLike | None = None,
+    lost: Counter[str] | None = None,
+) -> list[Drive]:  # fmt: skip
     """Read the drives of one or several tables, in the order of the files and of first appearance.
 
     `mapping`: what columns are called, and how tables are written, see `files.mapping`. A drive without a name is
@@ -70,12 +71,15 @@ def read_drives(
     `lost` counts those in no drive, by reason.
     """
     known = as_mapping(mapping)
-    files = inputs_of([paths] if isinstance(paths, str | Path) else paths)
-    if twice := {str(path) for path in files if files.count(path) > 1}:
+    every = [paths] if isinstance(paths, str | Path) else paths
+    files = [path for one in every for path in ([one] if isinstance(one, Drive) else inputs_of([one]))]
+    named = [path for path in files if not isinstance(path, Drive)]
+    if twice := {str(path) for path in named if named.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
-    return with_distinct_names(
-        [drive for path in files for drive in drives_of_table(read_table(path, known), known, path, lost)]
-    )
+    read = list[Drive]()
+    for one in files:
+        read += [one] if isinstance(one, Drive) else drives_of_table(read_table(one, known), known, one, lost)
+    return with_distinct_names(read)
 
 
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
@@ -120,13 +124,11 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
     if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
         needed = "needs distance_left and distance_right, or offset and lane_width"
         what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
+        what += "; x and y are in lanes with a road: fit --road, import tracks" if {"x", "y"} <= columns.keys() else ""
         raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     every = list(rows_of_drives(table, path))
-    if RUN not in columns:  # an import knows its own
-        require_evidence(
-            columns, every, path, is_named="time" in mapping.columns and bool(mapping.columns["time"].unit)
-        )
+    require_evidence(columns, every, path, {name for name, source in mapping.columns.items() if source.unit})
     drives = []
     for name, rows in every:
         drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path, lost)
@@ -143,25 +145,41 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
 
 
 def require_evidence(
-    columns: Mapping[str, FloatArray], drives: Sequence[tuple[str, NDArray[np.intp]]], path: Path, *, is_named: bool
-) -> None:
-    """Refuse drives whose rows contradict their clock, each other, or the unit and side of their offset."""
+    columns: Mapping[str, FloatArray], drives: Sequence[tuple[str, NDArray[np.intp]]], path: Path,
+    named: Collection[str],
+) -> None:  # fmt: skip
+    """Refuse drives whose rows contradict their clock, each other, or the unit and side of their offset.
+
+    `named`: columns whose unit a mapping states.
+    """
     offset, width = position(columns)
-    jumps, steps = [np.zeros(0)], [np.zeros(0)]
+    jumps, steps, wander = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
     for name, rows in drives:
         mine = rows[np.isfinite(columns["time"][rows])]
         mine = mine[np.argsort(columns["time"][mine], kind="stable")]
         time = columns["time"][mine]
         if len(mine) < 2:
             continue
-        if wrong := evidence.of_clock(time, is_named=is_named):
+        if wrong := evidence.of_clock(time, is_named="time" in named):
             raise FormatError(f"drive {name}: {wrong}", path=path, element="column 'time'")
-        if (count := evidence.in_turns(offset[mine])) > 1:
+        wander.append(evidence.wander(time, offset[mine]))
+        if (np.diff(time) > 0.0).all() and (count := evidence.in_turns(offset[mine])) > 1:
             what = f"rows of {count} vehicles or drives in turns; which is whose, drive=COLUMN says"
             raise FormatError(f"drive {name}: {what}", path=path, element="column 'offset'")
         lane = columns["lane_index"][mine] if "lane_index" in columns else None
         for all_of, found in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
             all_of.append(found)
+    if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
+        raise FormatError(wrong, path=path, element="column 'time'")
+    speed, most = columns.get("speed", np.zeros(0)), MAX_MEDIAN_SPEED * (2.0 if "speed" in named else 1.0)
+    median = float(np.nanmedian(speed)) if np.isfinite(speed).any() else 0.0
+    if median < 0.0:
+        what = f"is {median:.4g} m/s (median): it counts backwards, speed=COLUMN:-m/s turns the sign"
+        raise FormatError(what, path=path, element="column 'speed'")
+    if median > most:
+        what = f"is {median:.4g} m/s (median), more than {most:g}; if it is in km/h: --map speed=COLUMN:km/h"
+        what += "" if "speed" in named else ", else speed=COLUMN:m/s"
+        raise FormatError(what, path=path, element="column 'speed'")
     known = np.isfinite(offset + width)
     if known.any():
         farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 PARQUET = ".parquet"
 FEATHER = (".feather", ".arrow")
+MOST_LINES = 500  # of a text, that show whether ids begin with 0
+ID_HEADER = re.compile("(id|vin|drive|vehicle|trip|track|session|ride|case)$")
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
@@ -82,10 +84,20 @@ def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv
         text.seek(layout.start)
         separator = layout.separator or _separator(text, path, layout.start)
         csv |= {"skiprows": skipped} if skipped else {}
+        if "dtype" not in csv:
+            csv["dtype"] = _texts_of_digits(head[layout.start :], separator)
         table = _in_parts(text, layout.start, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
         table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
         table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
+
+
+def _texts_of_digits(head: bytes, separator: str) -> dict[str, type[str]]:
+    """Columns of ids such as 007, which are no numbers, by the file's beginning."""
+    lines = head.decode("utf-8-sig", "replace").splitlines()[:MOST_LINES]
+    names, *rows = ([cell.strip(' "') for cell in line.split(separator)] for line in lines or [""])
+    ids = (k for k, name in enumerate(names) if ID_HEADER.search(name.lower()))
+    return {names[k]: str for k in ids if any(re.fullmatch(r"0\d+", row[k]) for row in rows if len(row) > k)}
 
 
 def _in_parts(text: IO[bytes], start: int, **csv: Any) -> pd.DataFrame:
@@ -106,11 +118,18 @@ def _is_filler(name: str, column: pd.Series) -> bool:
     return name.startswith("Unnamed: ") and bool(column.isna().all())
 
 
+def tables_at(path: Path) -> list[Path]:
+    """The table of a path; of a folder, itself where it holds Parquet files, its parts, else all that are in it."""
+    if not path.is_dir() or any(path.rglob(f"*{PARQUET}")):
+        return [path]
+    return sorted(one for one in path.iterdir() if one.name.lower().endswith(TABLE_SUFFIXES)) or [path]
+
+
 def _parts(folder: Path) -> pd.DataFrame:
     """The table whose parts are the Parquet files of a folder, whose names of folders (``drive=7``) are columns."""
     files = sorted(folder.rglob(f"*{PARQUET}"))
     if not files:
-        raise FormatError(f"holds no table (*{PARQUET})", path=folder)
+        raise FormatError(f"holds no table ({', '.join(TABLE_SUFFIXES)})", path=folder)
     parts = []
     for file in files:
         keys = (part.partition("=") for part in file.relative_to(folder).parts[:-1])

@@ -8,6 +8,7 @@ from glob import has_magic
 from pathlib import Path, PosixPath, WindowsPath
 from typing import Any, TypeAlias
 
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.held import Held, hold
 from xosc_lateral.files.mapping import MappingLike, as_mapping
@@ -19,6 +20,9 @@ InputLike: TypeAlias = Any
 """A path, URL, pattern or folder; bytes, text or a file-like object; a data frame, a `Drive`, a result of ours."""
 
 KINDS = {b"PAR1": ".parquet", b"ARROW1": ".feather", b"<": ".xml", b"\xef\xbb\xbf<": ".xml"}
+
+
+DOCUMENTS = {b"<OpenSCENARIO": ".xosc", b"<OpenDRIVE": ".xodr"}
 
 
 class HeldPath(WindowsPath if os.name == "nt" else PosixPath):  # type: ignore[misc]
@@ -59,7 +63,8 @@ def _in_memory(one: InputLike, name: str) -> Path:
         assert data is not None
     stem = Path(str(getattr(one, "name", "") or name)).name if hasattr(one, "read") else name
     ending = next((end for magic, end in KINDS.items() if data.startswith(magic)), ".csv")
-    file = stem if Path(stem).suffix else f"{stem}{'.xosc' if b'<OpenSCENARIO' in data[:4096] else ending}"
+    ending = next((end for tag, end in DOCUMENTS.items() if tag in data[:4096]), ending)
+    file = stem if Path(stem).suffix else f"{stem}{ending}"
     held = hold({file: data})
     path = HeldPath(held.folder / file)
     path.held = held
@@ -76,10 +81,20 @@ def _frame_bytes(one: InputLike) -> bytes | None:
         frame = frame_of(one)
     except TypeError:
         return None
+    import pyarrow as pa
     import pyarrow.feather as feather
 
+    frame = frame.rename(columns=str).reset_index(drop=True)
+    if not frame.columns.is_unique:
+        raise FormatError(f"column {frame.columns[frame.columns.duplicated()][0]!r} appears twice")
     out = io.BytesIO()
-    feather.write_feather(frame.rename(columns=str).reset_index(drop=True), out, compression="uncompressed")
+    try:
+        table = pa.Table.from_pandas(frame, preserve_index=False)
+    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError):  # cells of several kinds become text
+        mixed = [name for name in frame.columns if frame[name].dtype == object]
+        texts = {name: frame[name].map(str, na_action="ignore") for name in mixed}
+        table = pa.Table.from_pandas(frame.assign(**texts), preserve_index=False)
+    feather.write_feather(table, out, compression="uncompressed")
     return out.getvalue()
 
 

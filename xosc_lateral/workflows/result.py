@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.note import Note, Telling, rows_left_out
-from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.base.note import Note, Telling, rows_left_out, warnings
+from xosc_lateral.files.source import parsed_hash, parsed_hashes
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.options import paths as as_paths
 
@@ -92,8 +91,8 @@ def write_table(
 
 __all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]
 
-DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
-"""A table's path, a frame, a `Drive`, or several of them."""
+DrivesLike: TypeAlias = Any
+"""A table's path, URL or pattern, its bytes, a frame, a result that has one, a `Drive`, or several of them."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -116,10 +115,25 @@ class GivenDrives:
     files: tuple[Path, ...]
     left_out: Mapping[str, int] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, drives: list[Drive], paths: Sequence[Path], left_out: Mapping[str, int] | None = None) -> GivenDrives:
+        """Of files that were read, on a disk or in memory."""
+        from xosc_lateral.files.held import held_at
+
+        files = tuple(path for path in paths if held_at(path) is None)
+        inputs = parsed_hashes(files) | {path.stem: parsed_hash(path) for path in paths if path not in files}
+        return cls(drives, inputs, files, {why: count for why, count in (left_out or {}).items() if count})
+
     @property
     def messages(self) -> tuple[Note, ...]:
-        """Rows that are left out."""
-        return rows_left_out(self.left_out)
+        """Rows that are left out, and what the drives say against themselves."""
+        return (*rows_left_out(self.left_out), *warnings(self.evidence()))
+
+    def evidence(self) -> list[str]:
+        """What the drives say against themselves, in lines; see `drivers.drives.evidence`."""
+        from xosc_lateral.drivers.drives.evidence import of_drives
+
+        return of_drives([drive.offset for drive in self.drives], [drive.lane_width for drive in self.drives])
 
     def valid_below(self, frequency: float | None) -> GivenDrives:
         """The same, where drives that don't state their band show driving below a frequency [Hz]."""
@@ -148,14 +162,17 @@ def naming(drives: GivenDrives) -> Iterator[None]:
         raise NotEnoughDataError(f"{', '.join(names[:3])}{more}: {error}") from error
 
 
-def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> GivenDrives:
+def given_drives(drives: DrivesLike, columns: MappingLike | None = None, road: PathLike | None = None) -> GivenDrives:
     """Read whatever stands for measured drives.
 
     Parameters
     ----------
-    drives : path, DataFrame, Drive, or sequence of them
+    drives : whatever `opened` takes, Drive, or sequence of them
+        Tables, and recordings that hold their lanes.
     columns : mapping of str to str, TableMapping, or path, optional
         Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``; or a saved mapping.
+    road : path, bytes or the like, optional
+        Road of recordings whose vehicles are at x and y.
 
     Raises
     ------
@@ -163,46 +180,35 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
         See `files.drives.read_drives`.
     """
     from xosc_lateral.drivers.drives.drive import Drive
-    from xosc_lateral.files.drives import drives_of_table, read_drives, with_distinct_names
-    from xosc_lateral.files.mapping import as_mapping
-    from xosc_lateral.files.remote import inputs_of
-    from xosc_lateral.files.tables import frame_of
+    from xosc_lateral.files.drives import read_drives
+    from xosc_lateral.files.tables import tables_at
+    from xosc_lateral.workflows.inputs import several
+    from xosc_lateral.workflows.opened import opened, opened_as_one
 
-    several = isinstance(drives, Sequence) and not isinstance(drives, str | Path | Drive)
-    items: list[Any] = list(drives) if several else [drives]  # type: ignore[arg-type]
-    mapping = as_mapping(columns)
-    files, lost = inputs_of(item for item in items if isinstance(item, str | Path)), Counter[str]()
-    if all(isinstance(item, str | Path) for item in items):
-        every = read_drives(files, mapping, lost)
-        return GivenDrives(every, parsed_hashes(files), tuple(files), +lost)
-    read: list[Drive] = []
-    inputs: dict[str, str] = {}
-    for number, item in enumerate(items, start=1):
-        if isinstance(item, Drive):
-            read.append(item)
-        elif isinstance(item, str | Path):
-            read += read_drives(item, mapping, lost)
-        else:
-            name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
-            frame = frame_of(item)
-            read += drives_of_table(frame, mapping, name, lost)
-            inputs[name] = frame_hash(frame)
-    return GivenDrives(with_distinct_names(read), parsed_hashes(files) | inputs, tuple(files), +lost)
+    items, lost = several(drives), Counter[str]()
+    label = "DataFrame" if len(items) == 1 else "DataFrame {}"
+    given: list[Path | Drive] = [
+        one
+        for number, item in enumerate(items, start=1)
+        for one in ([item] if isinstance(item, Drive) else opened(item, label.format(number)))
+    ]
+    if road is None:
+        given = [each for one in given for each in ([one] if isinstance(one, Drive) else tables_at(one))]
+    paths = [one for one in given if not isinstance(one, Drive)]
+    tables, mapping = given, columns
+    if (on := None if road is None else opened_as_one(road, name="road")) is not None:
+        tables = [one if isinstance(one, Drive) else _recorded(one, on, columns) for one in given]
+        mapping = None
+    read = read_drives(tables, mapping, lost)
+    return GivenDrives.of(read, paths if on is None else [*paths, on], lost)
 
 
-def frame_hash(frame: pd.DataFrame) -> str:
-    """SHA-256 over the names, kinds and values of a frame's columns, in hexadecimal."""
-    import numpy as np
+def _recorded(recording: Path, road: Path, columns: MappingLike | None) -> Path:
+    """The drive table of a recording."""
+    from xosc_lateral.base.plugins import service
+    from xosc_lateral.workflows.opened import opened
 
-    digest = hashlib.sha256()
-    for name in frame.columns:
-        values = frame[name]
-        digest.update(f"\0{name}\0{values.dtype}\0".encode())
-        if isinstance(values.dtype, np.dtype) and values.dtype.kind in "biuf":
-            digest.update(values.to_numpy().astype(values.dtype.newbyteorder("<")).tobytes())
-        else:  # texts, times, categories
-            digest.update(values.to_csv(index=False, header=False).encode())
-    return digest.hexdigest()
+    return opened(service("drives_of")(recording, road, columns), recording.name.split(".")[0])[0]
 
 
 def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:

@@ -104,7 +104,6 @@ LANES = {"offset": [0.0] * 9, "lane_width": [3.5] * 9}
         ({"lane_width": [350.0] * 9}, r"the lane is 350 m wide \(median\).*lane_width=COLUMN:cm"),
         ({"lane_width": [0.5] * 9}, r"the lane is 0\.5 m wide"),
         ({"offset": [30.0] * 9}, r"offsets of up to 30 m in a lane of 3\.5 m, 100 % of the rows"),
-        ({"speed": [130.0] * 9}, r"speed is 130 m/s .*speed=COLUMN:km/h"),
         ({"time": np.arange(9.0)}, r"rows are 1 s apart .*time=COLUMN:ms"),
     ],
 )

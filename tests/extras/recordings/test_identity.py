@@ -69,6 +69,10 @@ TRUTH = {
 }
 
 
+PASSAGES = TRUTH | {"standing": {"0", "1", "2", "2#2", "3"}}
+"""Entities: who leaps to where he should be is another one from there on."""
+
+
 @pytest.mark.parametrize("kind", ["leaping", "standing", "plain"])
 @pytest.mark.parametrize("door", ["fcd", "osi"])
 def test_doors_of_simulators_see_the_same(door: str, kind: str, tmp_path: Path, road: Path) -> None:
@@ -87,7 +91,7 @@ def test_doors_of_simulators_see_the_same(door: str, kind: str, tmp_path: Path, 
     other = import_drives("tracks", tracks, road=road)
     assert imported.provenance.rows.get("frozen") == other.provenance.rows.get("frozen")
     made = reconstruct(source, **case).to_dict()
-    assert {row["recorded_as"] for row in made["vehicles"]} == truth
+    assert {row["recorded_as"] for row in made["vehicles"]} == PASSAGES[kind]
     assert sum(made["rows"].values()) == len(traffic)
 
 
@@ -126,11 +130,11 @@ def test_all_doors_see_the_same_vehicles_and_count_all_rows(kind: str, tmp_path:
     assert {track.name for one in every for track in one.tracks} == truth
     (source,) = sources_of(path, SourceSettings(road=road))
     scenes = list(source.scenes())
-    assert {track.name for scene in scenes for track in scene.tracks} == truth
+    assert {track.name for scene in scenes for track in scene.tracks} == PASSAGES[kind]
     assert len(scenes) == len(every) == (2 if kind == "twice" else 1)
     case = "#2" if kind == "twice" else None
     made = reconstruct(path, road=road, case=case).to_dict()
-    held = {name for name in truth if kind != "twice" or name.endswith("#2")}
+    held = {name for name in PASSAGES[kind] if kind != "twice" or name.endswith("#2")}
     assert {row["recorded_as"] for row in made["vehicles"]} == held
     if kind != "twice":
         assert sum(made["rows"].values()) == len(traffic)

@@ -216,10 +216,10 @@ def test_bad_vehicles_are_named_and_left_out(tracks, road, tmp_path):
     said = "\n".join((*made.traffic.notes, *made.left_out))
     assert all(f"{name}:" in said for name in ("once", "beside", "gap", "leap", "on_foot", "back", "aside", "stood"))
     rows = {row["entity"]: row for row in made.to_dict()["vehicles"]}
-    assert set(rows) == {"A", "gap", "leap", "back", "aside", "aside_2", "stood", "stood_2"}
+    assert set(rows) == {"A", "gap", "gap_2", "leap", "back", "aside", "aside_2", "stood", "stood_2"}
     assert rows["back"]["to"] == pytest.approx(20.1, abs=0.11)
     assert (rows["aside_2"]["from"], rows["aside_2"]["lane_changes"]) == (12.0, 0)
-    assert rows["gap"]["from"] >= 15.0
+    assert rows["gap"]["to"] <= 10.0 and rows["gap_2"]["from"] >= 15.0  # nothing around the gap is lost
     assert rows["leap"]["to"] <= 30.1
     placed(tmp_path / "out/bad.xosc")
 
@@ -424,10 +424,15 @@ def test_commonroad_obstacles_drive_on_a_given_road_or_on_their_lanelets(is_give
     assert rows["V32"]["x"].iloc[-1] - rows["V32"]["x"].iloc[0] == pytest.approx(30.0 * 39.9, abs=0.5)
 
 
-def test_exid_drives_on_the_road_that_is_given_with_it(tmp_path):
+@pytest.mark.parametrize("is_ind", [False, True])
+def test_exid_and_its_sisters_drive_on_the_road_that_is_given_with_them(is_ind, tmp_path):
     from tests.extras.recordings.test_importers import _exid
 
     _exid(tmp_path, True)
+    if is_ind:  # inD, rounD and uniD know no lanes
+        (tracks,) = tmp_path.glob("*_tracks.csv")
+        known = pd.read_csv(tracks)
+        known.drop(columns=[name for name in known if "lane" in name.lower()]).to_csv(tracks, index=False)
     with pytest.raises(FormatError, match="--road"):
         xl.reconstruct(tmp_path)
     road = bent_road(tmp_path, 1.0 / (1500.0 - 5.4), 5.4, 3.6)

@@ -71,8 +71,13 @@ def test_a_curve_is_written_to_the_millimetre(tmp_path):
 
 
 def test_formats_are_told_from_names(tmp_path):
-    names = {"tasi.whl": "dlr-ht", "trajectories_2.csv": "dlr-ht", "01_tracks.csv": "levelx", "a_gt.mcap": "osi"}
-    assert {name: format_of(Path(name)) for name in names} == names
+    for name in ("01_tracks.csv", "01_recordingMeta.csv", "sind_tracks.csv"):
+        (tmp_path / name).touch()
+    names = {
+        "tasi.whl": "dlr-ht", "trajectories_2.csv": "dlr-ht", "01_tracks.csv": "levelx", "sind_tracks.csv": "tracks",
+        "a_gt.mcap": "osi",
+    }  # fmt: skip
+    assert {name: format_of(tmp_path / name) for name in names} == names
     assert format_of(Path("tracks.parquet")) == "tracks"
     assert format_of(tmp_path) == "levelx"
 
@@ -85,3 +90,13 @@ def test_against_its_lane_an_offset_is_left_of_the_lane_and_its_lateral_left_of_
     assert set(vehicle.lane.tolist()) == {1} and set(vehicle.way().tolist()) == {-1}
     np.testing.assert_allclose(vehicle.offset, -0.3, atol=1e-9)
     np.testing.assert_allclose(own_lateral(vehicle)[0], 0.3, atol=1e-9)
+
+
+def test_who_comes_back_is_another_entity_and_nothing_around_a_gap_is_lost(tmp_path):
+    network, time = two_roads(tmp_path), np.r_[np.arange(0.0, 8.0, 0.1), np.arange(13.0, 24.0, 0.1)]
+    columns = {"x": 5.0 + 10.0 * time, "y": np.full(len(time), -0.5 * LANE_WIDTH), "heading": np.zeros(len(time))}
+    track = RecordedTrack("a", time, columns, np.empty(0, dtype=np.intp), made_vehicle("a", 4.5, 1.8, 1.4), 0.0)
+    recording = place_tracks([track], network, 0.0, 24.0)
+    assert [vehicle.name for vehicle in recording.vehicles] == ["a", "a#2"]
+    assert sum(map(len, recording.vehicles)) == len(time)
+    assert any("comes back" in line for line in recording.left_out)

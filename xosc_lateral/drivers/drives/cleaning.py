@@ -224,6 +224,11 @@ def position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]
     return (right - left) / 2, right + left
 
 
+def _in_centimetres(columns: Mapping[str, FloatArray]) -> str:
+    given = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
+    return " ".join(f"{name}=COLUMN:cm" for name in given)
+
+
 def _check_units(
     name: str, columns: Mapping[str, FloatArray], offset: FloatArray, width: FloatArray, path: Path
 ) -> None:
@@ -235,7 +240,7 @@ def _check_units(
     if not LANE_WIDTHS[0] <= median_width <= LANE_WIDTHS[1]:
         raise FormatError(
             f"drive {name}: the lane is {median_width:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to "
-            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in lane_width=COLUMN:cm",
+            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in {_in_centimetres(columns)}",
             path=path,
         )
     outside = np.abs(offset) > np.maximum(width, LANE_WIDTHS[0])
@@ -245,14 +250,6 @@ def _check_units(
             f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
             "as in offset=COLUMN:cm",
             path=path,
-        )
-    speed = None if RUN in columns else columns.get("speed")  # an import knows its units
-    if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
-        raise FormatError(
-            f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "
-            "if it is in km/h: --map speed=COLUMN:km/h",
-            path=path,
-            element="column 'speed'",
         )
 
 

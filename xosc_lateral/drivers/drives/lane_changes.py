@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rates import fitted_rate, rate, white_noise
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 
@@ -19,6 +19,7 @@ CROSSING_RATE = 0.3  # a side that crosses a marking faster is in a lane change;
 MAXIMUM_HALF_DURATION = 8.0  # from the crossing to either end [s]
 MINIMUM_MOVEMENT = 0.02  # between two still stretches: what is worth a maneuver [m]
 RATE_WINDOW = 0.5  # the lateral speed is a difference over this [s]
+NOISE_LAG = 0.2  # noise is told from movement over this: rows may be made, between measured ones half as far apart [s]
 ON_ROW = 1e-6  # by which a time may miss a row [s]
 
 
@@ -60,7 +61,7 @@ class Course:
         cls, time: FloatArray, y: FloatArray, base: FloatArray, lanes: IntArray, side: FloatArray, **limits: float
     ) -> Course:
         """Of a position across the lanes and the centres of the lanes that it is in."""
-        return cls(time, y, base, lanes, rate(y, time, RATE_WINDOW), side, **limits)
+        return cls(time, y, base, lanes, _calm_rate(y, time), side, **limits)
 
     def changing(self, margin: float, *, in_part: bool = True) -> BoolArray:
         """Rows from a margin [s] before a lane change begins to a margin after it is over, shape (n,).
@@ -196,6 +197,16 @@ class Course:
             Rough(begin, peak, level, height, 0, height - level, aborted=True),
             Rough(peak, end, height, level, 0, aborted=True),
         ]
+
+
+def _calm_rate(y: FloatArray, time: FloatArray) -> FloatArray:
+    """Lateral speed, over a window in which noise is no movement: else a lane change seems calm before it is over."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else RATE_WINDOW
+    noise, most = white_noise(y, max(1, round(NOISE_LAG / step))), CALM_RATE / 3.0
+    if np.sqrt(2.0) * noise <= most * RATE_WINDOW:
+        return rate(y, time, RATE_WINDOW)
+    window = (12.0 * max(step, 0.5 * NOISE_LAG) * (noise / most) ** 2) ** (1.0 / 3.0)
+    return fitted_rate(y, time, max(window, RATE_WINDOW))
 
 
 def _without_overlaps(rough: list[Rough]) -> list[Rough]:

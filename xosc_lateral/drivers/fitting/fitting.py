@@ -235,8 +235,8 @@ def fit_warnings(
     With a `reference`, of real drivers, also about its band.
     """
     return [
-        *_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile),
-        *([closing.in_words(profile)] if closing.found_in(profile)[1] else []),
+        *profile.provenance.fit.get("evidence", ()), *_beside_given(profile, sensor_noise), *_coarse_steps(profile),
+        *_strained(profile), *([closing.in_words(profile)] if closing.found_in(profile)[1] else []),
         *([] if reference is None else _band_warnings(profile, reference)),
     ]  # fmt: skip
 

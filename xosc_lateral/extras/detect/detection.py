@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
@@ -80,7 +81,12 @@ class Detection(Result):
 
     def __str__(self) -> str:
         lines = aligned([self.headings, *(cells(row) for row in self.rows())])
-        return "\n".join([self.headline(), "", *lines, "", *self.legend()])
+        return "\n".join([self.headline(), "", *lines, "", *self.legend(), *self.message_lines()])
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """What reading the sources told."""
+        return tuple(Note(line, path=source.label) for source in (*self.origins, *self.homes) for line in source.said)
 
     def legend(self) -> Sequence[str]:
         """What the numbers count, and what can't be read from them."""
@@ -143,7 +149,7 @@ class Detection(Result):
                 "goal": self.goal.text,
                 "homes": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.homes],
             }),
-            "rows": [_plain(row) for row in self.rows()],
+            "rows": [_plain(row) for row in self.rows()], "messages": self.message_records(),
             "curves": [
                 {
                     "source": curve.source,

@@ -19,6 +19,7 @@ from xosc_lateral.extras.recordings.recordings import (
     REAR_AXLE,
     USUAL_WIDTH,
     RecordedTraffic,
+    format_of,
     read_recordings,
 )
 from xosc_lateral.files.held import Held, exists
@@ -32,7 +33,7 @@ from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.result import given_drives
+from xosc_lateral.workflows.result import GivenDrives, given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.surroundings.lane_order import RoadLanes
@@ -45,6 +46,7 @@ class Source:
     label: str
     scenes: Callable[[], Iterator[Scene]]
     files: tuple[Path, ...] = ()
+    said: dict[str, None] = field(default_factory=dict)  # what reading them told, a line each, in order
 
     def is_same(self, other: Source) -> bool:
         """Whether both are the same scenes."""
@@ -112,15 +114,13 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
-    name = path.name.lower()
-    is_table = (
-        name.endswith(TABLE_SUFFIXES) and not name.endswith("_tracks.csv") and not name.startswith("trajectories")
-    )
+    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and format_of(path) == "tracks"
+    said = dict[str, None]()
     if is_table and settings.road is None:
-        return Source(
-            path.stem.split(".")[0], lambda: drive_scenes(given_drives(path, settings.columns).drives), (path,)
-        )
-    return Source(path.name.split(".")[0], lambda: _recorded(path, settings), (path,))
+        read = lambda: _driven(given_drives(path, settings.columns), said)  # noqa: E731
+    else:
+        read = lambda: _recorded(path, settings, said)  # noqa: E731
+    return Source(path.name.split(".")[0], read, (path,), said)
 
 
 # ---- scenarios -------------------------------------------------------------------------------------------------------
@@ -175,9 +175,15 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
 
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------
-def _recorded(path: Path, settings: SourceSettings) -> Iterator[Scene]:
+def _driven(given: GivenDrives, said: dict[str, None]) -> Iterator[Scene]:
+    said |= dict.fromkeys(given.evidence())
+    return drive_scenes(given.drives)
+
+
+def _recorded(path: Path, settings: SourceSettings, said: dict[str, None]) -> Iterator[Scene]:
     """Tracks of several vehicles, a scene for each recording."""
     for traffic in read_recordings(path, road=settings.road, columns=settings.columns):
+        said |= dict.fromkeys(traffic.notes)
         yield _scene_of(traffic, path, settings)
 
 

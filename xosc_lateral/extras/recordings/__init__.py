@@ -22,6 +22,5 @@ CALLS = {
 }
 SERVICES = {
     "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
-    "recognised": "xosc_lateral.extras.recordings.importers.foreign_table",
-    "mapping_text": "xosc_lateral.extras.recordings.importers.foreign_table",
+    "drives_of": "xosc_lateral.extras.recordings.recordings",
 }

@@ -48,12 +48,17 @@ DEFAULT_CUTS = CutSettings()
 
 
 def lane_changes(
-    x: FloatArray, offset: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings
+    x: FloatArray,
+    offset: FloatArray,
+    lane: IntArray,
+    vehicle: IntArray,
+    clock: FloatArray | float,
+    settings: CutSettings,
 ) -> BoolArray:
     """Rows from where a vehicle sets off towards another lane to where it has settled there; arrays of shape (n,).
 
     `x`: lateral position, continuous through lane changes. [m] `offset`: from the centre of its lane. [m] Both NaN
-    where unknown; rows sorted by vehicle and time, `step` apart. [s]
+    where unknown; rows sorted by vehicle and time; `clock`: their times, or the step between them. [s]
     """
     changing = np.zeros(len(x), dtype=np.bool_)
     side = np.full(len(x), settings.open_offset)
@@ -62,7 +67,7 @@ def lane_changes(
         y, base = x[rows], x[rows] - offset[rows]
         known = np.flatnonzero(np.isfinite(base))
         if len(known) > 1:  # where it is in no lane, those before and after count
-            time = step * np.arange(len(y), dtype=np.float64)
+            time = clock[rows] if isinstance(clock, np.ndarray) else clock * np.arange(len(y), dtype=np.float64)
             base, y = (np.interp(time, time[known], values[known]) for values in (base, y))
             course = Course.across(time, y, base, lane[rows], side[rows], longest=settings.longest_change)
             changing[rows] = course.changing(settings.margin)
@@ -128,7 +133,7 @@ def cut_table(
     Rows sorted by vehicle and time, usually a step apart [s], shape (n,); `lane`: a number that changes with it.
     `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
     """
-    changing = lane_changes(sideways, columns["offset"], lane, vehicle, step, settings)
+    changing = lane_changes(sideways, columns["offset"], lane, vehicle, time, settings)
     state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
     runs = number_runs(state, lane, vehicle, time)
     words = pd.concat([pd.Series(kind[part], dtype=str) for part in blocks(len(kind))], ignore_index=True)
@@ -168,6 +173,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
     meant = {
         "in degrees, heading=COLUMN:deg": np.radians(heading),
         "the opposite direction": heading + np.pi,
+        "counted from y": heading + 0.5 * np.pi,
         CLOCKWISE: -heading,
         NORTH: 0.5 * np.pi - heading,
         "in degrees, " + CLOCKWISE: -np.radians(heading),

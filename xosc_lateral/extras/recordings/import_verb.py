@@ -154,8 +154,8 @@ def table_(
         table = _Table(output=output, quiet=reply.quiet, as_json=reply.as_json, force=reply.force)
         table.fill("table", sources, mapping=mapped.mapping())
         return
-    from xosc_lateral.extras.recordings.importers.foreign_table import propose_mapping
     from xosc_lateral.files.atomic import write_atomically
+    from xosc_lateral.files.recognised import propose_mapping
 
     text = propose_mapping(sources)
     (path,) = reply.claim(sources, mapping=(output, "mapping.toml"))

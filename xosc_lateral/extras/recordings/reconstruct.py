@@ -82,7 +82,7 @@ def reconstruct(
     traffic = read_recording(
         opened_as_one(recording, columns),
         kind=kind,
-        road=None if road is None else opened_as_one(road),
+        road=None if road is None else opened_as_one(road, name="road"),
         columns=columns,
         recording=case,
     )

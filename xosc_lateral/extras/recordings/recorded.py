@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain, count
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.rates import fitted_rate, rate
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 from xosc_lateral.drivers.drives.identity import LONGEST_BRIDGE, LONGEST_GAP, leaps
@@ -69,9 +71,12 @@ def own_lateral(vehicle: EntityMotion) -> tuple[FloatArray, FloatArray, IntArray
 
 
 def place_tracks(tracks: Sequence[RecordedTrack], network: RoadNetwork, start: float, end: float) -> Recording:
-    """Each vehicle's longest passage in driving lanes within a window of time. Raises `NotEnoughDataError`."""
+    """Each vehicle's passages in driving lanes within a window of time: who comes back after one is NAME#2.
+
+    Raises `NotEnoughDataError`.
+    """
     vehicles, left_out, counts = list[EntityMotion](), list[str](), Counter[str]()
-    inferred = dict[str, tuple[tuple[float, float], ...]]()
+    inferred, taken = dict[str, tuple[tuple[float, float], ...]](), {track.name for track in tracks}
     for track in tracks:
         inside = (np.hypot(track.x, track.y) < MAXIMUM_COORDINATE) & np.isfinite(track.heading)
         rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
@@ -79,14 +84,12 @@ def place_tracks(tracks: Sequence[RecordedTrack], network: RoadNetwork, start: f
         if len(rows):
             apart = np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]
             counts["repeated time"] += int((~apart).sum())
-            placed = _place(track, rows[apart], network, left_out, start, counts)
-            if placed is not None:
-                vehicle, bridged = placed
+            for vehicle, bridged in _place(track, rows[apart], network, left_out, start, counts, taken):
                 vehicles.append(vehicle)
                 gaps = tuple(
                     (float(vehicle.time[p.start]), float(vehicle.time[p.stop - 1])) for p in true_slices(bridged)
                 )
-                inferred |= {track.name: gaps} if gaps else {}
+                inferred |= {vehicle.name: gaps} if gaps else {}
     if not vehicles:
         why = f": {left_out[0]}" if left_out else ""
         raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
@@ -96,10 +99,11 @@ def place_tracks(tracks: Sequence[RecordedTrack], network: RoadNetwork, start: f
 
 def _place(
     track: RecordedTrack, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str], start: float,
-    counts: Counter[str],
-) -> tuple[EntityMotion, BoolArray] | None:  # fmt: skip
+    counts: Counter[str], taken: set[str],
+) -> list[tuple[EntityMotion, BoolArray]]:  # fmt: skip
+    """Passages in order of time, and which of their rows nobody saw."""
     time, x, y, heading, inferred = _bridged(track, rows)
-    velocity = np.stack([_slope(time, x), _slope(time, y)])
+    velocity = np.stack([fitted_rate(x, time, VELOCITY_WINDOW), fitted_rate(y, time, VELOCITY_WINDOW)])
     heading = _steady_heading(time, x, y, velocity, heading, network)
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     nearest = network.world_to_lane(x, y, heading=heading)
@@ -107,7 +111,7 @@ def _place(
     if not on_lane.any():
         left_out.append(f"{track.name}: on no driving lane")
         counts["off the lanes"] += len(rows)
-        return None
+        return []
     lane_heading, width, there = np.zeros(len(x)), np.full(len(x), np.nan), np.flatnonzero(on_lane)
     place = nearest.road[there], nearest.lane[there], nearest.s[there]
     lane_heading[there], width[there] = network.lane_to_world(*place).heading, network.lane_width(*place)
@@ -123,8 +127,8 @@ def _place(
         "off the lanes": int((~on_lane & seen).sum()),
         "across a lane or backwards": int((elsewhere & seen).sum()),
     }
-    best = max(passages, key=lambda part: time[part[-1]] - time[part[0]], default=np.zeros(0, dtype=np.intp))
-    kept = int(seen[best].sum())
+    every = np.concatenate([*passages, np.zeros(0, dtype=np.intp)])
+    kept = int(seen[every].sum())
     lost = len(rows) - kept
     reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
     counts.update({"kept": kept, **{why: max(count, 0) for why, count in reasons.items()}})
@@ -132,36 +136,26 @@ def _place(
     if not passages:
         head = f"{track.name}: no {MINIMUM_PASSAGE:g} s along a driving lane without a gap"
         left_out.append(f"{head}; of {len(rows)} rows {rows_lost}")
-        return None
+        return []
     if lost:
         left_out.append(f"{track.name}: {lost} of {len(rows)} rows: {rows_lost}")
-    if inferred[best].any():
-        left_out.append(f"{track.name}: {int(inferred[best].sum())} rows are inferred: nobody saw it for up to 4 s")
-    moments, x, y, turned = time[best] - start, x[best], y[best], np.where(way[best] < 0, np.pi, 0.0)
-    motion = EntityMotion.of(
-        track.entity, moments, x=x, y=y, heading=lane_heading[best] + turned, heading_relative=turned,
-        speed=np.hypot(rate(x, moments), rate(y, moments)), road=nearest.road[best], lane=nearest.lane[best],
-        s=nearest.s[best], offset=nearest.offset[best], lane_width=width[best],
-    )  # fmt: skip
-    return motion, inferred[best]
-
-
-def _slope(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Rate of change at each row, by least squares over `VELOCITY_WINDOW`; shape (n,)."""
-    if len(time) < 2:
-        return np.zeros(len(time))
-    half = 0.5 * VELOCITY_WINDOW + 1e-6
-    first = np.minimum(np.searchsorted(time, time - half), np.maximum(np.arange(len(time)) - 1, 0))
-    last = np.maximum(np.searchsorted(time, time + half), np.minimum(np.arange(len(time)) + 2, len(time)))
-    t, v = time - time.mean(), values - values.mean()
-
-    def total(terms: FloatArray) -> FloatArray:
-        sums = np.r_[0.0, np.cumsum(terms)]
-        return np.asarray(sums[last] - sums[first])
-
-    count = (last - first).astype(np.float64)
-    spread = count * total(t * t) - total(t) ** 2
-    return np.asarray((count * total(t * v) - total(t) * total(v)) / spread)
+    if inferred[every].any():
+        left_out.append(f"{track.name}: {int(inferred[every].sum())} rows are inferred: nobody saw it for up to 4 s")
+    made = []
+    free = (name for number in count(2) if (name := f"{track.name}#{number}") not in taken)
+    for name, part in zip(chain([track.name], free), passages, strict=False):
+        taken.add(name)
+        moments, turned = time[part] - start, np.where(way[part] < 0, np.pi, 0.0)
+        motion = EntityMotion.of(
+            structs.replace(track.entity, name=name), moments, x=x[part], y=y[part],
+            heading=lane_heading[part] + turned, heading_relative=turned,
+            speed=np.hypot(rate(x[part], moments), rate(y[part], moments)), road=nearest.road[part],
+            lane=nearest.lane[part], s=nearest.s[part], offset=nearest.offset[part], lane_width=width[part],
+        )  # fmt: skip
+        made.append((motion, inferred[part]))
+    if len(made) > 1:
+        left_out.append(f"{track.name}: comes back {len(made) - 1} times: {', '.join(one.name for one, _ in made[1:])}")
+    return made
 
 
 def _steady_heading(
@@ -204,7 +198,13 @@ def _bridged(
     from scipy.interpolate import CubicHermiteSpline
 
     parts = np.split(np.arange(len(rows)), np.flatnonzero(step > LONGEST_GAP) + 1)
-    velocity = np.concatenate([np.stack([_slope(time[p], x[p]), _slope(time[p], y[p])]) for p in parts], axis=1)
+    velocity = np.concatenate(
+        [
+            np.stack([fitted_rate(x[p], time[p], VELOCITY_WINDOW), fitted_rate(y[p], time[p], VELOCITY_WINDOW)])
+            for p in parts
+        ],
+        axis=1,
+    )
     new = []
     for k in np.flatnonzero(gaps).tolist():
         at = time[k] + usual * np.arange(1, int(np.ceil(step[k] / usual - 1e-6)))

@@ -14,7 +14,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import require_along_lanes
-from xosc_lateral.extras.recordings.importers import dlr_ht, dlr_ut, levelx
+from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
@@ -24,6 +24,7 @@ from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of
 from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
+from xosc_lateral.files.source import read_source
 from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
@@ -105,12 +106,18 @@ def _composed(track: RecordedTrack) -> RecordedTrack:
     return replace(track, name=name, entity=structs.replace(track.entity, name=name))
 
 
+def drives_of(source: Path, road: Path, columns: MappingLike | None = None) -> ImportedDrives:
+    """The drives of a recording on a road."""
+    kind = format_of(source)
+    return import_drives(kind, source, road=road, **({"mapping": columns} if kind == "tracks" else {}))
+
+
 def format_of(source: Path) -> str:
-    """A recording's format by its name; a table, where nothing else fits."""
+    """A recording's format by its name and what lies beside it; a table, where nothing else fits."""
     name = source.name.lower()
     if name.endswith((".whl", ".zip")) or name.startswith("trajectories_"):
         return "dlr-ut" if "urban" in name else "dlr-ht"
-    if (source.is_dir() and any(source.glob("*_tracks.csv"))) or _is_levelx(source):
+    if any(map(_is_levelx, source.glob("*_tracks.csv"))) if source.is_dir() else _is_levelx(source):
         return "levelx"
     if name.endswith((".osi", ".mcap", ".osi.gz")):
         return "osi"
@@ -158,9 +165,9 @@ def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
 
 
 def _is_levelx(source: Path) -> bool:
-    """A recording of levelX has its meta beside it."""
+    """A recording of levelX has its meta beside it: others call their tracks the same."""
     name = source.name
-    return name.lower().endswith("_tracks.csv") and source.with_name(f"{name[:-10]}_recordingMeta.csv").exists()
+    return name.endswith("_tracks.csv") and source.with_name(name.replace("_tracks.csv", "_recordingMeta.csv")).exists()
 
 
 def name_of(source: Path) -> str:
@@ -171,7 +178,7 @@ def name_of(source: Path) -> str:
 def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
     """`made`: OpenDRIVE of the recording's own lanes, for where no road is given."""
     if road is not None:
-        network, data, road_name = read_opendrive(road), road.read_bytes(), road.name
+        network, data, road_name = read_opendrive(road), read_source(road).data, road.name
     elif made is not None:
         network, data, road_name = parse_opendrive(made, name_of(source)), made, f"{name_of(source)}.xodr"
     else:
@@ -180,7 +187,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
     heading = tracks.heading - network.header_offset.heading
     every = slice(None, None, max(1, len(x) // GATE_ROWS))
     place = require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    shift = of_registration(*place, tracks.vehicle[every])
+    shift = of_registration(*place, tracks.vehicle[every], heading[every])
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
     label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""
@@ -273,7 +280,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
     table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
-    if recording.is_exid:
+    if "xCenter" in table.columns:  # exiD, inD, rounD, uniD
         kinds = recording.classes(meta.set_index("trackId").reindex(table["trackId"]))
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
         return _on_road(tracks_of(named, files[0], (), columns), files[0], road)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TypedDict
 
 from xosc_lateral.workflows import options as say
-from xosc_lateral.workflows.options import PathLike, Paths, option
+from xosc_lateral.workflows.inputs import RoadLike
+from xosc_lateral.workflows.options import Paths, option
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")  # of the standard, that can be written
 
@@ -34,8 +35,8 @@ class ReconstructSettings:
     format: str | None = option(
         None, str, kind=str | None, show_default=False,
         help="dlr-ht, dlr-ut, levelx, osi, commonroad, fcd, tracks; default: by the file.")
-    road: Path | None = option(
-        None, Path, kind=Path | None, show_default=False,
+    road: RoadLike | None = option(
+        None, lambda stated: stated, kind=Path | None, show_default=False,
         help="OpenDRIVE file, or SUMO network, that it was recorded on.")
     case: str | None = option(
         None, str, kind=str | None, metavar="NAME", show_default=False, help="Which of several recordings in a file.")
@@ -66,7 +67,7 @@ class ReconstructKeywords(TypedDict, total=False):
     """The same names for type checkers, with what a call may be given."""
 
     format: str | None
-    road: PathLike | None
+    road: RoadLike | None
     case: str | None
     begin: float | None
     end: float | None

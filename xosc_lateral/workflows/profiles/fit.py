@@ -72,7 +72,7 @@ def fit(
     maneuvers: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="RECORDING",
         help="Recording whose lane changes the profile holds too: what `reconstruct` reads.")] = None,
     road: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="FILE",
-        help="Road of that recording, where it holds none: OpenDRIVE, or SUMO's network.")] = None,
+        help="Road of a recording that holds none, of drives or --maneuvers: OpenDRIVE, SUMO's network.")] = None,
     library: Paths = (),
 ) -> DriverProfile:  # fmt: skip
     """Fit a driver profile.
@@ -106,14 +106,15 @@ def fit(
         raise ValueError(f"sensor_noise of {sensor_noise:g} m: {known}")
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
-    tables = given_drives(drives, columns).valid_below(valid_below)
+    tables = given_drives(drives, columns, None if maneuvers is not None else road).valid_below(valid_below)
     by_default = isinstance(prior, str) and prior == PRIOR_PROFILE
+    lines = tables.evidence()
     with naming(tables):
         known = Provenance(
             source=source or ", ".join(tables.inputs),
             licence=licence,
             inputs=dict(tables.inputs),
-            fit=summary_of(tables.drives, tables.left_out),
+            fit=summary_of(tables.drives, tables.left_out) | ({"evidence": lines} if lines else {}),
         )
         profile = fit_profile(
             tables.drives,

@@ -15,9 +15,11 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note, rows_left_out, warnings
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
-from xosc_lateral.files.tables import read_table
+from xosc_lateral.files.recognised import mapping_text, recognised
+from xosc_lateral.files.tables import read_table, tables_at
 from xosc_lateral.workflows.opened import opened
 from xosc_lateral.workflows.options import Paths, declare_options
 from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, given_drives, write_page
@@ -44,11 +46,10 @@ def check(drives: Paths, *, columns: MappingLike | None = None) -> Health:
     FormatError
         Only where there is no table at all: what is wrong with one is part of the result.
     """
-    from xosc_lateral.base.plugins import service
-
-    files, stated = tuple(opened(drives, "DataFrame")), as_mapping(columns)
-    seen, left = service("recognised")([read_table(path, stated) for path in files], files[-1])
-    proposal = service("mapping_text")(files, stated, seen, left)
+    files = tuple(each for one in opened(drives, "DataFrame") for each in tables_at(one))
+    stated = as_mapping(columns)
+    seen, left = recognised([read_table(path, stated) for path in files], files[-1])
+    proposal = mapping_text(files, stated, seen, left)
     guess = mapping_of(tomllib.loads(proposal), Path("the proposed mapping"))
     mappings = [stated, replace(guess, columns={**guess.columns, **stated.columns}, roles=stated.roles)]
     wrong, read = list[str](), None
@@ -163,10 +164,7 @@ class Health(Result):
         if self.profile is None:
             return [f"a profile: {self.why}"] if self.why else []
         assert self.read is not None
-        from xosc_lateral.workflows.profiles.fit import fit_warnings
-
-        known = set[str]().union(*(drive.context for drive in self.read.drives))
-        lines = list(fit_warnings(self.profile))
+        known, lines = set[str]().union(*(drive.context for drive in self.read.drives)), list[str]()
         if "speed" not in known:
             lines.append("what speed does, and slow driving is not cut out: there is no column `speed`")
         if not set(BESIDE) & known:
@@ -175,19 +173,27 @@ class Health(Result):
             lines.append("how drivers differ: there is one drive")
         return lines
 
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """Rows left out, what the drives say against themselves, and what `fit` would."""
+        if self.read is None or self.profile is None:
+            return () if self.read is None else self.read.messages
+        from xosc_lateral.workflows.profiles.fit import fit_warnings
+
+        return (*rows_left_out(self.read.left_out), *warnings(fit_warnings(self.profile)))
+
     def __str__(self) -> str:
         names = [
             f"  {row['column']} = {row['in the table'].removesuffix(in_unit).rstrip()}{in_unit}  {row['seen']}"
             + ("" if row["median"] is None else f"; {row['5 %']:.4g} to {row['95 %']:.4g}") for row in self.columns
             for in_unit in [f" [{row['unit']}]"]
         ]  # fmt: skip
-        left_out = [f"rows left out: {count} {why}" for why, count in self.figures.get("left_out", {}).items()]
         return "\n".join(
             [
                 self.headline(), *(f"wrong: {what}" for what in self.wrong[self.read is None :]), "columns:", *names,
-                *([f"  others: {', '.join(self.others)}"] if self.others else []), *left_out,
+                *([f"  others: {', '.join(self.others)}"] if self.others else []),
                 *([self.sensor] if self.sensor else []), *(f"can be fitted: {line}" for line in self.can()),
-                *(f"can't be fitted: {line}" for line in self.cannot()),
+                *(f"can't be fitted: {line}" for line in self.cannot()), *self.message_lines(),
             ]
         )  # fmt: skip
 
@@ -202,7 +208,7 @@ class Health(Result):
             "guessed": self.is_guessed, "wrong": list(self.wrong), "columns": list(map(dict, self.columns)),
             "others": list(self.others),
             "summary": self.figures, "drives": self.drives, "sensor": self.sensor,
-            "can": self.can(), "cannot": self.cannot(), "mapping": self.mapping,
+            "can": self.can(), "cannot": self.cannot(), "messages": self.message_records(), "mapping": self.mapping,
         }  # fmt: skip
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:

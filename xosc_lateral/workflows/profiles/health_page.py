@@ -39,7 +39,7 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
     if facts["sensor"]:
         page.text(f"{facts['sensor']}.")
     page.section("What can be fitted")
-    cannot = facts["cannot"]
+    cannot = [*facts["cannot"], *(one["what"] for one in facts["messages"] if one["severity"] == "warning")]
     page.items(facts["can"] or ["Nothing yet."])
     if cannot:
         page.heading("What not, and what is in doubt")

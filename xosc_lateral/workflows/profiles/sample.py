@@ -15,9 +15,9 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
-from xosc_lateral.files.remote import inputs_of
-from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.files.tables import context_of_table, frame_of, read_table
+from xosc_lateral.files.tables import context_of_table, read_table
+from xosc_lateral.workflows.inputs import several
+from xosc_lateral.workflows.opened import opened
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -26,7 +26,6 @@ from xosc_lateral.workflows.result import (
     Paths,
     ProfileLike,
     Result,
-    frame_hash,
     given_drives,
     given_profile,
     naming,
@@ -79,7 +78,7 @@ def sample(
         return Offsets(driver, made, seed, None, settings, messages)
     tables = None if context is None else _context_alone(context, driver, lane_width, columns)
     if tables is None:
-        tables = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+        tables = given_drives(like if like is not None else context, columns)
     drives = tables.drives
     if like is not None:
         with naming(tables):
@@ -98,32 +97,22 @@ def _context_alone(
     """
     if as_mapping(columns) != TableMapping():
         return None
-    drives, inputs = list[Drive](), dict[str, str]()
-    stated = context if isinstance(context, list | tuple) else [context]
-    items: list[Any] = [
-        each for item in stated for each in (inputs_of([item]) if isinstance(item, str | Path) else [item])
-    ]
-    for number, item in enumerate(items, start=1):
-        if isinstance(item, Drive):
-            return None
-        is_file = isinstance(item, Path)
-        name = str(item) if is_file else "DataFrame" if len(items) == 1 else f"DataFrame {number}"
-        table = read_table(Path(name)) if is_file else frame_of(item)
+    if any(isinstance(item, Drive) for item in several(context)):
+        return None
+    files, drives = opened(context, "DataFrame"), list[Drive]()
+    for path in files:
+        table = read_table(path)
         headers = {plain_header(str(header)) for header in table.columns}
         places = ("offset", "distance_left", "distance_right")
         if any(header.startswith(places) for header in headers) or "drive" in headers:
             return None
-        if not is_file:
-            inputs[name] = frame_hash(table)
-        known = context_of_table(table, Path(name))
+        known = context_of_table(table, path)
         first, last = (pick(at[edge] for at, _ in known.values()) for pick, edge in ((min, 0), (max, -1)))
         time = np.arange(first, last + 1e-9, STEP)
         values = {column: np.interp(time, *over_time) for column, over_time in known.items()}
         width = values.setdefault("lane_width", np.full(len(time), lane_width or profile.lane_width))
-        label = file_label(Path(name)) if is_file else name
-        drives.append(Drive(label, time, np.zeros(len(time)), width, values, source=name))
-    files = tuple(item for item in items if isinstance(item, Path))
-    return GivenDrives(drives, parsed_hashes(files) | inputs, files)
+        drives.append(Drive(file_label(path), time, np.zeros(len(time)), width, values, source=str(path)))
+    return GivenDrives.of(drives, files)
 
 
 LEFT_OUT_NOTE = "not known, left without effect"

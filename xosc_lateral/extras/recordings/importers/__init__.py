@@ -94,6 +94,8 @@ def import_drives(
     sources = (opened_as_one(source, options.get("mapping")),) if format == "tracks" else tuple(opened(source, "table"))
     if not sources:
         raise ValueError("no source to import")
+    if options.get("road") is not None:
+        options["road"] = opened_as_one(options["road"], name="road")
     read = find_importer(format)
     made = read(sources[0] if len(sources) == 1 else sources, **_known_options(read, format, options))
     return as_imported(made, format, sources, options)

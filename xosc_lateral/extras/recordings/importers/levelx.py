@@ -136,7 +136,11 @@ class Recording:
     def require(self, columns: Sequence[str]) -> None:
         """Refuse tracks that lack a column."""
         if missing := [name for name in columns if name not in self.tracks.columns]:
-            raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=self.path, line=1)
+            raise FormatError(
+                f"no column {', '.join(missing)}; neither highD nor exiD (others: import tracks --road)",
+                path=self.path,
+                line=1,
+            )
 
 
 def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:

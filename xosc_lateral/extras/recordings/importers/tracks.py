@@ -130,7 +130,7 @@ def import_placed(
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
     tracks = placed.tracks
-    shift = of_registration(placed.offset, placed.lane_width, tracks.vehicle)
+    shift = of_registration(placed.offset, placed.lane_width, tracks.vehicle, tracks.heading)
     notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes, *([shift] if shift else []))))
     return imported(
         table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
