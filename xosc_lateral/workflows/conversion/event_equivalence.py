@@ -21,10 +21,18 @@ from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_gr
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, EventShift, nominal_result
-from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, compare_runs, largest_of
+from xosc_lateral.workflows.conversion.shifts import (
+    EVENT_TOLERANCE,
+    Change,
+    Comparison,
+    compare_runs,
+    largest_of,
+    later,
+    runs_of,
+)
 from xosc_lateral.world.motion.gaps import gaps_of
+from xosc_lateral.world.motion.look import Finding, look_at, moving_share
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
 from xosc_lateral.world.player.player import play
@@ -61,8 +69,8 @@ LEAST_DURATION = 20.0
 
 SIZES = (1.0, 0.75, 0.5, 0.25, 0.0)
 """Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
-LARGE_SHIFT = 0.3
-"""Of its duration, by which an action lasts longer or shorter without a word. [-]"""
+LATE, LATE_END = 0.1, 0.5
+"""By which an event begins and ends earlier or later without a word, if it is explained. [s]"""
 LEAST_MOVING = 0.9
 """Share of driving time below which it is told. [-]"""
 MOST_TRIALS = 40
@@ -84,9 +92,12 @@ class EventEquivalence:
         last = max((one.start if one.end is None else one.end for one in motion.actions), default=0.0)
         until = last if self._is_cut_off else motion.end_time
         self.limit = min(inf if time_limit is None else time_limit, LONGEST_RUN * max(until, LEAST_DURATION))
-        self._drives = drives(motion, egos)
-        self._order = list(range(len(self._drives)))  # in which an output's runs are played
-        self._before = [self._run(played.scenario, k) for k in self._order]
+        self._drives = drives(motion, egos, played.network)
+        self._before: list[tuple[Scenario, NominalMotion]] = []
+        for k in range(len(self._drives)):
+            self._before.append(self._run(played.scenario, k))
+        # in which an output's runs are played: not those in which an ego changes nothing for anybody
+        self._order = [k for k in range(len(self._drives)) if not any(self._alike(k, j) for j in range(k))]
         self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
 
     @property
@@ -96,13 +107,13 @@ class EventEquivalence:
 
     @property
     def end(self) -> float:
-        """Of the longest run, that under a braking ego aside. [s]"""
+        """Of the longest run, those under egos that stop aside. [s]"""
         return max(motion.end_time for _, motion in self._before[:3])
 
     @property
     def longest_time(self) -> float:
         """Time that a run may take. [s]"""
-        return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before))
+        return max(LEAST_TIME, LONGER * max(motion.end_time for _, motion in self._before[:4]))
 
     def farthest(self, name: str) -> float:
         """Distance that an entity may drive in that time, as fast as it ever is in a run. [m]"""
@@ -116,8 +127,25 @@ class EventEquivalence:
             return scenario, motion
         if k == 0:
             return scenario, play(scenario, network, step=self._step, time_limit=self.limit)
-        driven = with_speeds(_ending_with(scenario, source), motion, self._egos, self._drives[k])
-        return driven, play(driven, network, step=max(self._step, TRIAL_STEP), time_limit=self.limit)
+        driven = with_speeds(_ending_with(scenario, source), motion, self._egos, *self._drives[k])
+        limit = self.limit if k < 4 else min(self.limit, self.longest_time)
+        return driven, play(driven, network, step=max(self._step, TRIAL_STEP), time_limit=limit)
+
+    def _alike(self, k: int, j: int) -> bool:
+        """Whether everything happens in two runs of the source at the same times and places, the egos aside."""
+        (_, one), (_, other) = self._before[k], self._before[j]
+        then, now = runs_of(one.actions), runs_of(other.actions)
+        if then.keys() != now.keys() or any(abs(then[key].start - now[key].start) > EVENT_TOLERANCE for key in then):
+            return False
+        for entity, twin in zip(one.entities, other.entities, strict=True):
+            time = entity.time[entity.time <= twin.time[-1]]
+            apart = [
+                entity.columns[name][: len(time)] - np.interp(time, twin.time, twin.columns[name]) for name in "xy"
+            ]
+            reach = EVENT_TOLERANCE * (1.0 + np.abs(entity.speed[: len(time)]))
+            if entity.name not in self._egos and (np.hypot(*apart) > reach).any():
+                return False
+        return True
 
     def compare(
         self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, most: float = inf
@@ -132,21 +160,39 @@ class EventEquivalence:
         for k in self._order:
             name, (driven, before), (_, run) = (NOMINAL_RUN, *OTHER_RUNS)[k], self._before[k], self._run(scenario, k)
             nominal_run = run if k == 0 else nominal_run
-            kept = (one for one in before.actions if one.path[:3] not in gone and one.actor not in trajectories)
-            nominal = replace(before, actions=tuple(kept))
+            kept, still = (
+                replace(motion, actions=tuple(
+                    one for one in motion.actions if one.path[:3] not in gone and one.actor not in trajectories
+                ))
+                for motion in (before, run)
+            )  # fmt: skip
             ends = k == 0 or not gone  # else stories that others wait for may be gone
-            comparison = compare_runs(driven, network, nominal, run, ignored=trajectories, ends=ends)
+            comparison = compare_runs(driven, network, kept, still, ignored=trajectories, ends=ends)
+            by_chance: tuple[Change, ...] = ()
             if comparison.changes:
                 key = name, frozenset(trajectories)
                 if key not in self._chance:  # of the source alone: the same for all that is tried
-                    self._chance[key] = self._by_chance(driven, nominal, trajectories)
-                others = (one for one in comparison.changes if abs(one.size) > self._chance[key].get(one.what, 0.0))
-                comparison = structs.replace(comparison, changes=tuple(others))
-            movement = changed_movement(network, before, run, moved)
+                    self._chance[key] = self._by_chance(driven, kept, trajectories)
+                hangs = [abs(one.size) <= self._chance[key].get(one.what, 0.0) for one in comparison.changes]
+                by_chance, others = (
+                    tuple(one for one, does in zip(comparison.changes, hangs, strict=True) if does is which)
+                    for which in (True, False)
+                )
+                comparison = structs.replace(comparison, changes=others)
+            found = list(look_at(network, before, run, {*moved, *trajectories}, shifted=comparison.first))
+            meant = (
+                Change(f"'{one.entity}' at {one.time:.1f} s", one.entity, one.time, one.what)
+                for one in found
+                if one.is_meaning
+            )
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
-            changes = tuple(structs.replace(one, run=name) for one in (*comparison.changes, *movement))
+            changes, by_chance = (
+                tuple(structs.replace(one, run=name) for one in some)
+                for some in ((*comparison.changes, *meant), by_chance)
+            )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            comparisons[k] = Comparison(shifts, changes, shares, name)
+            told = tuple(one for one in found if not one.is_meaning)
+            comparisons[k] = Comparison(shifts, changes, told, by_chance, shares, name)
             if len(_changes(comparisons.values())) >= most:
                 break
         self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
@@ -225,17 +271,35 @@ class EquivalentPaths:
                 yield Note(f"'{name}' {moves}", is_warning=True, entity=name, run=run)
         listed = set[tuple[str, str | None]]()
         for shift in self.shifts:
-            longer = shift.end - shift.start
-            is_explained = abs(shift.unexplained_end) <= EVENT_TOLERANCE
-            is_long = is_explained and shift.duration > 0.0 and abs(longer) > LARGE_SHIFT * shift.duration
-            if is_long and (shift.event, shift.entity) not in listed:
-                listed.add((shift.event, shift.entity))
-                what = (
-                    f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s lasts "
-                    f"{shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way across is another one"
+            longer, event = shift.end - shift.start, f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s"
+            is_explained = max(abs(shift.unexplained_start), abs(shift.unexplained_end)) <= EVENT_TOLERANCE
+            if not is_explained or (shift.event, shift.entity) in listed:
+                continue
+            if abs(longer) > LATE_END:
+                its = (
+                    f"lasts {shift.duration + longer:.2f} instead of {shift.duration:.2f} s: its way across is another"
                 )
-                yield Note(what, is_warning=True, entity=shift.entity, run=shift.run)
+            elif abs(shift.start) > LATE:
+                its = f"comes {later(shift.start)}: what it waits for does"
+            else:
+                continue
+            listed.add((shift.event, shift.entity))
+            yield Note(f"{event} {its}", is_warning=True, entity=shift.entity, run=shift.run)
+        yield from self._findings()
+        for one in {one.what: one for compared in reversed(self.comparisons) for one in compared.by_chance}.values():
+            what = f"{one.what} {one.how}: it hangs on a frame of the player, without offsets as well"
+            yield Note(what, entity=one.entity, run=one.run)
         yield from (one.note for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
+
+    def _findings(self) -> Iterator[Note]:
+        """The worst of each kind for each vehicle, with its run."""
+        alike: dict[tuple[str, str], list[tuple[Finding, str]]] = {}
+        for compared in self.comparisons:
+            for one in compared.findings:
+                alike.setdefault((one.entity, one.kind), []).append((one, compared.run))
+        for found in alike.values():
+            worst, run = max(found, key=lambda each: each[0].size)
+            yield worst.note(run, len(found) - 1)
 
 
 def shrink_until_equivalent(
@@ -278,8 +342,11 @@ def shrink_until_equivalent(
 
 
 def _changes(comparisons: Iterable[Comparison]) -> list[Change]:
-    """Each once."""
-    return list({change.what: change for comparison in comparisons for change in comparison.changes}.values())
+    """Each once, as it first is."""
+    found: dict[str, Change] = {}
+    for change in (one for comparison in comparisons for one in comparison.changes):
+        found.setdefault(change.what, change)
+    return list(found.values())
 
 
 def _blamed(

@@ -17,10 +17,10 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT, REACHED
 from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept, why_untouched
 from xosc_lateral.workflows.conversion.consequences import stays_as_written
-from xosc_lateral.workflows.conversion.movement import DRIVING_SPEED
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.driver_clock import DriverClock
+from xosc_lateral.world.motion.look import DRIVING_SPEED
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.offset_path import (
     LEAST_GAP,
