@@ -6,6 +6,7 @@ take longer or shorter from beside the middle explain (`shifts`). Otherwise move
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -67,13 +68,15 @@ movement is again what it was. [-]"""
 LEAST_DURATION = 20.0
 """Of that run. [s]"""
 
-SIZES = (1.0, 0.75, 0.5, 0.25, 0.0)
+SIZES = (1.0, 0.5, 0.25, 0.0)
 """Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
+TRIALS = 3
+"""Of a vehicle: if what happens is otherwise still, it stays as written if that mends it. [-]"""
 LATE, LATE_END = 0.1, 0.5
 """By which an event begins and ends earlier or later without a word, if it is explained. [s]"""
 LEAST_MOVING = 0.9
 """Share of driving time below which it is told. [-]"""
-MOST_TRIALS = 40
+MOST_TRIALS = 12
 """Of a conversion: beyond, what is left is told. [-]"""
 
 Output = TypeVar("Output")
@@ -173,7 +176,7 @@ class EventEquivalence:
                 key = name, frozenset(trajectories)
                 if key not in self._chance:  # of the source alone: the same for all that is tried
                     self._chance[key] = self._by_chance(driven, kept, trajectories)
-                hangs = [abs(one.size) <= self._chance[key].get(one.what, 0.0) for one in comparison.changes]
+                hangs = [abs(one.size) <= self._chance[key].get(one.about, 0.0) for one in comparison.changes]
                 by_chance, others = (
                     tuple(one for one, does in zip(comparison.changes, hangs, strict=True) if does is which)
                     for which in (True, False)
@@ -205,8 +208,8 @@ class EventEquivalence:
             again = play(driven, network, step=factor * before.step, time_limit=self.limit)
             ends = before.ended_by == again.ended_by
             compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
-            sizes = {one.what: abs(one.size) + again.step for one in compared.changes}
-            chance |= {what: max(size, chance.get(what, 0.0)) for what, size in sizes.items()}
+            for one in compared.changes:
+                chance[one.about] = max(abs(one.size) + again.step, chance.get(one.about, 0.0))
         return chance
 
 
@@ -320,20 +323,24 @@ def shrink_until_equivalent(
 
     output, comparisons = attempt(paths, inf)
     changes = _changes(comparisons)
-    stuck = set[tuple[int, int]]()
+    given_up, tried = set[int](), Counter[str]()
     while changes and trials < MOST_TRIALS:
-        blamed = _blamed(changes, paths, motion, sizes, stuck)
+        blamed = _blamed(changes, paths, motion, sizes, given_up)
         if blamed is None:
             break
-        for smaller in SIZES[SIZES.index(sizes.get(blamed, 1.0)) + 1 :]:
-            trial = sizes | {blamed: smaller}
+        name = paths[blamed].entity
+        theirs = [k for k, path in enumerate(paths) if path.entity == name and not path.instead]
+        ways: list[Sizes] = [{blamed: smaller} for smaller in SIZES[SIZES.index(sizes.get(blamed, 1.0)) + 1 :]]
+        for way in ways[: max(TRIALS - tried[name], 0)] or [dict.fromkeys(theirs, SIZES[-1])]:
+            trial = sizes | way
             made, outcome = attempt(applied(trial), len(changes))
             trials += 1
+            tried[name] += 1
             if len(_changes(outcome)) < len(changes):
                 sizes, output, comparisons, changes = trial, made, outcome, _changes(outcome)
                 break
         else:
-            stuck.add((blamed, len(changes)))
+            given_up |= {*theirs} if tried[name] > TRIALS else {blamed}
     least: dict[str, tuple[float, bool]] = {}
     for name in dict.fromkeys(paths[k].entity for k in sizes):
         theirs = [k for k, path in enumerate(paths) if path.entity == name]
@@ -354,7 +361,7 @@ def _blamed(
     paths: Sequence[OffsetPath],
     motion: NominalMotion,
     sizes: Sizes,
-    stuck: Collection[tuple[int, int]],
+    given_up: Collection[int],
 ) -> int | None:
     """The path that most likely changes what happens: its entity's, the nearest before; else any other."""
 
@@ -367,9 +374,7 @@ def _blamed(
         theirs = [k for k, path in enumerate(paths) if path.entity == change.entity]
         order += sorted(theirs, key=lambda k: (begins(paths[k]) > change.time, -begins(paths[k])))
     order += range(len(paths))
-    free = (
-        k for k in order if sizes.get(k, 1.0) > SIZES[-1] and (k, len(changes)) not in stuck and not paths[k].instead
-    )
+    free = (k for k in order if sizes.get(k, 1.0) > SIZES[-1] and k not in given_up and not paths[k].instead)
     return next(free, None)
 
 

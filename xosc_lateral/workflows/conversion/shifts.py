@@ -71,6 +71,11 @@ class Change(Struct, frozen=True):
         return str(self.note)
 
     @property
+    def about(self) -> str:
+        """Which it is, whenever it comes."""
+        return self.what.rpartition(" at ")[0] or self.what
+
+    @property
     def note(self) -> Note:
         """It as a warning."""
         what = f"{self.what} {self.how} with the offsets"
@@ -129,7 +134,7 @@ def compare_runs(
     for key, action in now.items():
         if key not in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what, first = _named(key, action), (*key[:2], 0) not in then
-            how = "happens, though not without them," if first else "happens once more"
+            how = "is new" if first else "happens once more"
             changes.setdefault(what, Change(what, key[1], action.start, how))
     others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
