@@ -26,7 +26,7 @@ from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
+from xosc_lateral.world.motion.look import look_at, moving_share
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.motion.way import way_of
 from xosc_lateral.world.player.player import play
@@ -130,7 +130,7 @@ def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turnin
 
     def seen(**columns: np.ndarray) -> list[str]:
         other = tuple(car.having(**columns) if one is car else one for one in motion.entities)
-        return [str(one) for one in changed_movement(played.network, motion, replace(motion, entities=other), ["T"])]
+        return [one.what for one in look_at(played.network, motion, replace(motion, entities=other), ["T"]) if one.is_meaning]
 
     later = car.time > 5.0
     assert seen() == []
