@@ -137,7 +137,7 @@ class Traffic:
 
         The same drivers go on from where their vehicles are then.
         """
-        self._time = None
+        self._time, self._knots = None, 0
         self._state["following"] = False
 
     # ---- who is there ------------------------------------------------------------------------------------------------
@@ -312,9 +312,9 @@ class Traffic:
         begun = [name for name, is_begun in zip(self._names, self._state["begun"], strict=True) if is_begun]
         if sorted(begun) != sorted(name for _, members in self._groups.values() for name in members):
             raise ValueError("drivers and groups name others")
-        if self._time is None:
+        if self._time is None and not self._knots:
             return
-        if self._columns is None:
+        if self._time is None or self._columns is None:
             raise ValueError("it says only one of time and columns")
         if not abs(self._time / self._step - self._knots) < 2.0:
             raise ValueError(f"its time is {self._time} s, after {self._knots} steps of its model")
