@@ -14,7 +14,8 @@ import xosc_lateral as xl
 from tests.kit.enriched import converted, made_enriched
 from tests.kit.made.actions import ACTIONS
 from tests.kit.made.scenario import made as made_scenario
-from xosc_lateral.workflows.conversion.event_equivalence import OTHER_RUNS, EquivalentPaths
+from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS
+from xosc_lateral.workflows.conversion.equivalent_paths import EquivalentPaths
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison

@@ -142,7 +142,7 @@ def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turnin
     later = car.time > 5.0
     assert seen() == []
     assert "is put" in seen(y=car.y + np.clip(0.5 * (car.time - 5.0), 0.0, 0.4))[0]
-    assert "is turned by 0.30 rad" in seen(heading_relative=car.heading_relative + np.where(later, 0.3, 0.0))[0]
+    assert "is turned by 17.2 degrees" in seen(heading=car.heading + np.where(later, 0.3, 0.0))[0]
     road = np.where(car.road == 2, 1, car.road).astype(np.int32)
     assert "drives onto road '2' as number 2" in seen(road=road)[0]
 

@@ -24,7 +24,7 @@ from tests.kit.scenario_files import (
 from tests.world.scenario.test_under_test import at, controller, event, headway, state, stories
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.batch.manifest import read_manifest
-from xosc_lateral.workflows.conversion.event_equivalence import with_speeds
+from xosc_lateral.workflows.conversion.ego_drives import with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play

@@ -26,7 +26,8 @@ from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.event_equivalence import as_played, shrink_until_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
+from xosc_lateral.workflows.conversion.event_equivalence import as_played
 from xosc_lateral.workflows.conversion.plan import Plan, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges

@@ -19,7 +19,6 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction
 
 STORY_PREFIX = "xosc-lateral"
 """Begins the names of stories that we add."""
@@ -31,9 +30,6 @@ DRIVING_SPEED = 3.0
 """Above which somebody drives. [m/s]"""
 LARGEST_SLIDE = 0.05
 """By which a way may be longer in a window than what the speed says, more than in the source. [m]"""
-LARGEST_TURN = 0.1
-"""Of a heading against the lane, more than in the source, where no lateral action runs. [rad]"""
-
 LOOK_STEP, LOOK_AROUND = 0.05, 3.0
 """Accelerations and yaw rates are seen at 20 Hz, and held against the largest of the source so far around. [s]"""
 FRAME_TURN, FRAME = 0.010, 0.01
@@ -41,8 +37,8 @@ FRAME_TURN, FRAME = 0.010, 0.01
 besides. [s]"""
 LATERAL_ACCELERATION, YAW_RATE = 3.0, 0.15
 """Beyond the source's: somebody has steered into a corner of a path. [m/s2], [rad/s]"""
-HEADING = np.radians(3.0)
-"""Against the source's. [rad]"""
+HEADING, LARGEST_TURN = np.radians(3.0), 0.1
+"""Against the source's; and as nobody drives. [rad]"""
 CREEP, TURN_AT_REST = 0.002, 5e-3
 """In all while both stand, and in a frame of it. [m], [rad]"""
 STANDING_SPEED = 1e-3
@@ -91,7 +87,7 @@ def look_at(
     for entity in after.entities:
         source = sources[entity.name]
         if entity.name in moved:
-            found = [*_drives_otherwise(network, source, entity, _led_across(after, entity))]
+            found = [*_drives_otherwise(network, source, entity)]
             found += compare_tracks(source, entity, shifted)
         else:
             found = [*_elsewhere(_Both(source, entity), shifted, AS_WRITTEN)]
@@ -210,7 +206,8 @@ def _heading(both: _Both, shifted: float) -> Iterator[Finding]:
     curved = both.around(np.abs(both.bend) / np.maximum(both.speed[0] * both.step, FRAME), WINDOW)
     turned = np.abs(_wrapped(both.heading[1] - both.heading[0])) - both.apart * curved
     if found := both.worst(np.where(both.gap | (both.time >= shifted), 0.0, turned), HEADING):
-        yield Finding("heading", both.name, *found, f"is turned by {np.degrees(found[1]):.1f} degrees")
+        what = f"is turned by {np.degrees(found[1]):.1f} degrees"
+        yield Finding("heading", both.name, *found, what, is_meaning=found[1] > LARGEST_TURN)
 
 
 def _at_rest(both: _Both) -> Iterator[Finding]:
@@ -239,22 +236,8 @@ def _cause(run: NominalMotion, finding: Finding) -> str:
 
 
 # ---- on the road -----------------------------------------------------------------------------------------------------
-def _led_across(run: NominalMotion, entity: EntityMotion) -> BoolArray:
-    """Rows in which an action of the source leads it along a path: to another lane."""
-    rows = np.zeros(len(entity.time), dtype=np.bool_)
-    for played in run.actions:
-        is_own = not played.path[0].startswith(STORY_PREFIX)
-        if played.actor == entity.name and is_own and isinstance(played.action.content, FollowTrajectoryAction):
-            rows |= (entity.time >= played.start) & (entity.time <= (np.inf if played.end is None else played.end))
-    return rows
-
-
-def _drives_otherwise(
-    network: RoadNetwork, source: EntityMotion, entity: EntityMotion, across: BoolArray
-) -> Iterator[Finding]:
-    """Where it slides, is turned against its lane, takes another road; `across`: rows in which a path leads to another
-    lane.
-    """
+def _drives_otherwise(network: RoadNetwork, source: EntityMotion, entity: EntityMotion) -> Iterator[Finding]:
+    """Where it slides, and takes another road."""
     slides = [_over_window(one, np.maximum(_longer_way(one), 0.0)) for one in (source, entity)]
     row = int(np.argmax(slides[1]))
 
@@ -264,16 +247,6 @@ def _drives_otherwise(
     if slides[1][row] > slides[0].max() + LARGEST_SLIDE:
         size = float(slides[1][row])
         yield found("slides", size, f"is put {size:.2f} m from where it drives", row)
-    # roads of a junction lie on each other: which one it is on there is anybody's guess
-    crossing = np.array([road.junction is not None for road in network.roads])
-    turns = [
-        np.where(is_free & ~crossing[one.road], np.abs(np.sin(one.heading_relative)), 0.0)
-        for one, is_free in ((source, _is_free(source)), (entity, _is_free(entity) & ~across))
-    ]
-    row = int(np.argmax(turns[1]))
-    if turns[1][row] > turns[0].max() + LARGEST_TURN:
-        size = float(turns[1][row])
-        yield found("turned", size, f"is turned by {size:.2f} rad against its lane", row)
     roads = [_roads(network, one) for one in (source, entity)]
     for k, ((road, row), (other, _)) in enumerate(zip(roads[1], roads[0], strict=False)):
         if road != other:
