@@ -7,7 +7,7 @@ is turned, takes another road, goes round a corner that nobody drives, or does n
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from math import inf
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.ndimage import maximum_filter1d
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.note import Note
+from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
@@ -95,6 +96,26 @@ def look_at(
             yield structs.replace(one, cause=_cause(before, one))
 
 
+def compare_parts(source: Track, other: Track) -> Iterator[Finding]:
+    """The same for long runs, a block of rows after the other."""
+    for rows in blocks(len(source.time)):
+        before, after = (
+            Track(one.name, one.time[rows], {name: values[rows] for name, values in one.columns.items()},
+                  one.breaks[(one.breaks > rows.start) & (one.breaks < rows.stop)] - rows.start)
+            for one in (source, other)
+        )  # fmt: skip
+        yield from compare_tracks(before, after)
+
+
+def worst_of(findings: Iterable[Finding]) -> list[Finding]:
+    """Of each kind and entity."""
+    worst: dict[tuple[str, str], Finding] = {}
+    for one in findings:
+        if one.size > worst.get((one.entity, one.kind), one).size or (one.entity, one.kind) not in worst:
+            worst[one.entity, one.kind] = one
+    return list(worst.values())
+
+
 def compare_tracks(source: Track, other: Track, shifted: float = inf) -> Iterator[Finding]:
     """How a vehicle with offsets moves, held against itself without: poses alone, in the same frames."""
     both = _Both(source, other)
@@ -165,8 +186,9 @@ def _wrapped(angle: FloatArray) -> FloatArray:
 def _elsewhere(both: _Both, shifted: float, limit: float) -> Iterator[Finding]:
     """Along the road where it has offsets, else anywhere."""
     far = both.apart
-    if limit == ALONG:  # beside its way, a bend is longer or shorter
-        far = np.abs(both.ahead - np.cumsum(np.where(both.gap, 0.0, both.aside * both.bend)))
+    if limit == ALONG:  # beside its way, a bend is longer or shorter for who drives at his speed; a replay is on time
+        longer = np.cumsum(np.where(both.gap, 0.0, both.aside * both.bend))
+        far = np.minimum(np.abs(both.ahead), np.abs(both.ahead - longer))
     far = np.where(both.gap, 0.0, far)
     for rows, most in ((both.time < shifted, limit), (both.time >= shifted, AFTER_A_SHIFT)):
         if found := both.worst(np.where(rows, far, 0.0), most):
