@@ -29,6 +29,8 @@ BRAKING_START, LATEST_BRAKING = 5.0, 15.0
 """When one begins to brake to a stop: from, to. [s]"""
 STANDING_TIME = 2.0
 """For which it stands. [s]"""
+STAYING_RATE = 100.0
+"""How fast one that never comes is at rest: within its length of where it begins. [m/s2]"""
 LANE_CHANGE_START, LANE_CHANGE_TIME = 3.0, 4.0
 """When one begins to change lanes, for how long. [s]"""
 CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
@@ -77,7 +79,7 @@ def drives(motion: NominalMotion, egos: Collection[str], network: RoadNetwork) -
         Drive(((CHANGE_START, 0.7, CHANGE_RATE),)),
         Drive(((CHANGE_START, 1.3, CHANGE_RATE),)),
         Drive(((braking, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE))),
-        Drive(((0.0, 0.0, BRAKING_RATE),)),
+        Drive(((0.0, 0.0, STAYING_RATE),)),
     )
     return (*ways, Drive((), beside)) if beside else ways
 
