@@ -51,6 +51,7 @@ class CompiledDriver:
             "start": [pointer, ctypes.c_uint64, ctypes.c_uint32, real, ctypes.c_uint64],
             "look": [pointer, pointer],
             "step": [pointer, real, pointer, pointer],
+            "restart": [pointer, real],
             "message": [pointer],
             "save": [pointer, pointer],
             "restore": [pointer, pointer, ctypes.c_size_t],
@@ -84,6 +85,10 @@ class CompiledDriver:
         row, outputs = self._row(values), np.empty(3)
         self._call("step", time, row.ctypes.data, outputs.ctypes.data)
         return outputs
+
+    def restart(self, time: float) -> None:
+        """Go on after a pause."""
+        self._call("restart", time)
 
     def fault(self) -> tuple[int, str]:
         """What wanted what can't be driven, and in words."""

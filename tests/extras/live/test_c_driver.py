@@ -35,6 +35,7 @@ from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.extras.live.c_driver import c_sources, export_c
 from xosc_lateral.extras.live.c_numbers import numbers_of
+from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.profiles import read_profile, write_profile
 
 SHIPPED = sorted(path.stem for path in (Path(__file__).resolve().parents[3] / "driver_profiles").glob("*.json"))
@@ -157,6 +158,39 @@ def test_steps_of_a_second_hold_the_context_that_they_are_given(tmp_path: Path) 
     driver.start(5)
     held = [driver.step(0.2 * row, row_of(context, -(-row // 5)))[0] for row in range(59 * 5 + 1)]
     np.testing.assert_allclose(offsets, held[::5], rtol=0.0, atol=TOLERANCE)
+
+
+def starting(speed: float, seconds: float) -> np.ndarray:
+    """From a speed on, to a stop, a rest of 3 s and on to 60 km/h. [m/s]"""
+    time = 0.05 * np.arange(round(seconds / 0.05))
+    return np.interp(time, [0.0, 4.0, 7.0, 10.0, 22.0], [speed, speed, 0.0, 0.0, 16.7])
+
+
+@pytest.mark.parametrize("kmh", [0.0, 5.0, 20.0, 39.0, 40.0])
+def test_c_and_python_drive_alike_from_rest_on_and_after_a_leap(kmh: float, tmp_path: Path) -> None:
+    """First step, stop, rest, driving off, and going on a thousand seconds later, in the same context."""
+    profile = replace(read_profile("motorway"), effects=())
+    driver, traffic = CompiledDriver(profile, tmp_path), Traffic(profile)
+    traffic.seed_of = lambda _: child(np.random.SeedSequence(7), 0)  # type: ignore[method-assign]
+    one, on = np.ones(1), np.ones(1, dtype=np.bool_)
+    apart, place, begin, time = list[float](), 0.3, 0.0, 0.0
+    driver.start(7)
+    for leap, speeds in ((0.0, starting(kmh / 3.6, 25.0)), (1000.03, starting(kmh / 3.6, 12.0))):
+        begin = time + leap
+        if leap:
+            driver.restart(begin)
+            traffic.restart()
+        for k, speed in enumerate(speeds):
+            time = begin + 0.05 * k
+            row = {**dict.fromkeys(driver.columns, np.nan), "speed": speed, "lane_width": 3.6, "position": place}
+            ours = traffic.step(time, Moment(("a",), speed * one, 3.6 * one, place * one, on, on, ~on))
+            theirs = driver.step(time, row)
+            apart.append(float(np.abs(theirs - [ours.offset[0], ours.rate[0], ours.heading[0]]).max()))
+            if kmh == 0.0 and not leap and speed == 0.0 and k < 80:
+                assert theirs[0] == place and theirs[2] == 0.0, "a car that never moved is where and as it was put"
+            place = float(theirs[0])
+        place += 0.4  # somebody has put it elsewhere meanwhile
+    assert max(apart) < TOLERANCE
 
 
 def test_the_rate_is_the_offsets_and_the_heading_the_rates(tmp_path: Path) -> None:

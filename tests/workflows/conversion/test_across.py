@@ -15,7 +15,7 @@ from scipy.stats import beta
 import xosc_lateral as xl
 from tests.world.motion.test_crossings import WIDTH, scenario
 from tests.world.scenario.test_under_test import headway, state
-from xosc_lateral.workflows.conversion.event_equivalence import with_speeds
+from xosc_lateral.workflows.conversion.ego_drives import with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.segments import ALPHA, BETA
 from xosc_lateral.world.player.player import play

@@ -14,7 +14,8 @@ import xosc_lateral as xl
 from tests.kit.enriched import converted, made_enriched
 from tests.kit.made.actions import ACTIONS
 from tests.kit.made.scenario import made as made_scenario
-from xosc_lateral.workflows.conversion.event_equivalence import OTHER_RUNS, EquivalentPaths
+from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS
+from xosc_lateral.workflows.conversion.equivalent_paths import EquivalentPaths
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison
@@ -162,11 +163,13 @@ def test_what_other_egos_cause_is_never_told_as_the_scenario_s_own(tmp_path: Pat
     assert kept.shifts == shifts
     assert kept.trial_contacts == (f"{contact.what} is new with the offsets (run: {braking})",)
     lines = tuple(map(str, kept.warnings((), {("Slow", "Van")})))
-    assert lines == kept.trial_contacts, "the movement's own warnings tell of the nominal contact"
+    assert lines[1:] == kept.trial_contacts, "the movement's own warnings tell of the nominal contact"
+    late = f"event 'cut in' of 'Van' at 37.30 s comes 1.20 s later: what it waits for does (run: {braking})"
+    assert lines[0] == late, "an event that is explained comes late all the same"
 
     made = converted(made_enriched(tmp_path), *lines)
     made.shifts = kept.shifts
     page = read(conversion_page(made))
     assert [(row["run"], row["at [s]"]) for row in page.tables["How"]] == [(NOMINAL_RUN, "8.50"), (braking, "37.30")]
-    assert page.warnings == [f"Warning{contact}"]
+    assert page.warnings == [f"Warning{line}" for line in lines]
     assert not page.marked

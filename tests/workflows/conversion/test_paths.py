@@ -24,9 +24,9 @@ from tests.kit.scenario_files import (
 from tests.kit.stage import follow, polyline
 from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
-from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, drives, with_speeds
+from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, Drive, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.conversion.movement import changed_movement, moving_share
+from xosc_lateral.world.motion.look import look_at, moving_share
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.motion.way import way_of
 from xosc_lateral.world.player.player import play
@@ -69,13 +69,16 @@ def test_a_car_moves_through_a_turn_and_takes_it(turning: Path, tmp_path: Path) 
 
 
 def test_an_ego_of_the_check_stops_so_that_others_would_stand_at_a_joint(turning: Path) -> None:
-    motion = play_scenario(turning).motion
+    played = play_scenario(turning)
+    motion = played.motion
     car = next(one for one in motion.entities if one.name == "T")
     joints = car.time[1:][np.diff(car.road) != 0]
-    _, slow, fast, ((braking, to, _), (later, *_)) = drives(motion, ["Ego"])
+    speeds = [one.speeds for one in drives(motion, ["Ego"], played.network)]
+    _, slow, fast, ((braking, to, _), (later, *_)), ((begin, never, _),) = speeds[:5]
+    assert (begin, never) == (0.0, 0.0)
     assert (slow[0][1], fast[0][1], to) == (0.7, 1.3, 0.0) and later > braking + 18.0 / BRAKING_RATE
     assert np.abs(joints - braking - 0.5 * 18.0 / BRAKING_RATE).min() < 1e-9
-    assert drives(motion, []) == ((),)
+    assert drives(motion, [], played.network) == (Drive(),)
 
 
 def test_a_way_ends_where_s_turns_round_and_goes_on_behind() -> None:
@@ -130,12 +133,16 @@ def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turnin
 
     def seen(**columns: np.ndarray) -> list[str]:
         other = tuple(car.having(**columns) if one is car else one for one in motion.entities)
-        return [str(one) for one in changed_movement(played.network, motion, replace(motion, entities=other), ["T"])]
+        return [
+            one.what
+            for one in look_at(played.network, motion, replace(motion, entities=other), ["T"])
+            if one.is_meaning
+        ]
 
     later = car.time > 5.0
     assert seen() == []
     assert "is put" in seen(y=car.y + np.clip(0.5 * (car.time - 5.0), 0.0, 0.4))[0]
-    assert "is turned by 0.30 rad" in seen(heading_relative=car.heading_relative + np.where(later, 0.3, 0.0))[0]
+    assert "is turned by 17.2 degrees" in seen(heading=car.heading + np.where(later, 0.3, 0.0))[0]
     road = np.where(car.road == 2, 1, car.road).astype(np.int32)
     assert "drives onto road '2' as number 2" in seen(road=road)[0]
 

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
-from xosc_lateral.workflows.conversion.event_equivalence import shrink_until_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion

@@ -24,7 +24,7 @@ from tests.kit.scenario_files import (
 from tests.world.scenario.test_under_test import at, controller, event, headway, state, stories
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.batch.manifest import read_manifest
-from xosc_lateral.workflows.conversion.event_equivalence import with_speeds
+from xosc_lateral.workflows.conversion.ego_drives import with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.player.player import play
@@ -377,3 +377,19 @@ def test_a_vehicle_that_steadily_is_slow_moves_although_its_speed_may_change(tmp
     )
     xl.convert(write_scenario(tmp_path, text), tmp_path / "out.xosc", mode="lane-offset", seed=1)
     assert _moves_on(tmp_path / "out.xosc", "A", 8, 14, 20) == [True, True, True]
+
+
+FIELD = Path(__file__).resolve().parents[4] / "shared" / "cases" / "field"
+
+
+@pytest.mark.skipif(not FIELD.is_dir(), reason="no shared cases")
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        ("event_of_ego_added_is_not_said/lat_fire_more", "event 'brake' of 'Ego' at 0.02 s is new with the offsets"),
+        ("left_as_written_rides_on_converted/load1", "'bike' is up to 10.98 m elsewhere from where it is as written"),
+    ],
+)
+def test_what_only_an_output_does_and_who_rides_on_others_is_told_with_its_run(case: str, told: str) -> None:
+    lines = [line for line in xl.convert(FIELD / f"{case}.xosc", seed=1).warnings if told in line]
+    assert len(lines) == 1 and lines[0].endswith("(run: nominal)")

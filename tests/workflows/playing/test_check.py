@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from tests.kit.stage import line, map_of, road, section
 from xosc_lateral.files.opendrive.reader import parse_opendrive
+from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.playing.check import doubts_about
 from xosc_lateral.world.motion.nominal import (
     Activity,
@@ -63,6 +65,25 @@ def test_a_jump_aside_is_named_with_its_time_but_for_who_is_placed_anew(network:
     placed = np.full(len(TIME), Activity.ACTIVE, dtype=np.uint8)
     placed[30] |= Activity.TELEPORTED
     assert not said(network, car(y=y, activity=placed))
+
+
+FIELD = Path(__file__).resolve().parents[4] / "shared" / "cases" / "field"
+
+
+@pytest.mark.skipif(not FIELD.is_dir(), reason="no shared cases")
+@pytest.mark.parametrize(
+    ("case", "told"),
+    [
+        ("jump_blamed_on_the_road/ld5", "a LongitudinalDistanceAction without dynamic constraints puts it"),
+        ("contact_point_contradicts_geometry/contact", "contactPoint='end' of the successor of road '1' contradicts"),
+        ("ttc_rising_at_zero/scenario", "holds from the start on, and so does not rise"),
+        ("standing_lane_offset/scenario", "'A' moves sideways while it hardly drives"),
+        ("sync_behind_target/scenario", "the place of 'B' lies behind it"),
+    ],
+)
+def test_a_doubt_names_its_cause(case: str, told: str) -> None:
+    lines = list(map(str, play_scenario(FIELD / f"{case}.xosc").motion.messages))
+    assert sum(told in line for line in lines) == 1, lines
 
 
 def test_no_lateral_action_is_a_jump(network: RoadNetwork) -> None:

@@ -48,6 +48,9 @@ def test_a_vehicle_that_somebody_else_drives_is_found_by_what_says_so(
     [
         *((name, True) for name in ("Ego", "ego", "EGO", "hero", "ego_vehicle", "EgoVehicle", "Ego2", "ego_vehicle_1")),
         *((name, True) for name in ("VUT", "SUT", "Host", "host vehicle", "SubjectVehicle", "subject_vehicle")),
+        *((name, True) for name in ("VehicleUnderTest", "vehicle_under_test", "SystemUnderTest", "Ego_Truck", "DUT")),
+        *((name, True) for name in ("EgoTruck", "EGO_VUT", "Ego_VW", "CarEgo")),
+        *((name, False) for name in ("EgoTarget", "Ego_Ghost", "GVT", "Hostile")),
         *((name, False) for name in ("Egon", "Lego", "subject", "Target", "hostile", "Car1", "hero_truck_driver")),
     ],
 )

@@ -102,4 +102,4 @@ def _memory(sizes: Mapping[str, int]) -> int:
     """Bytes of `DRIVER_state`, whose fields all have eight; the C compiler checks it."""
     history = sizes["ROWS"] * (sizes["COMPONENTS"] + 1)
     per_size = sum(sizes[name] for name in ("STEPS", "EVERY", "TAPS", "COMPONENTS", "LAGS")) + 10 * sizes["HIDDEN"]
-    return 8 * (106 + history + per_size)
+    return 8 * (108 + history + per_size)

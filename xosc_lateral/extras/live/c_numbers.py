@@ -107,6 +107,7 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
                                                       "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
         "STEP_PEAK": driver_clock.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
         "LARGEST_SINE": paths.LARGEST_SINE,
+        "STANDSTILL": paths.STANDSTILL,
         "CLOCK_KNOTS": len(CLOCK_SPEEDS), "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip

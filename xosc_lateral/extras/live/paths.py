@@ -36,14 +36,16 @@ CLOCK_TOLERANCE = 1e-9
 DRIVER = np.dtype(
     [("curve", float, 6), ("next", float, 6), ("ahead", bool), ("clock", float), ("own_rate", float), ("begun", bool),
      ("following", bool), ("place", float), ("rest", float), ("from", float), ("from_rate", float), ("share", float),
-     ("over", float), ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, SPEEDS_REMEMBERED)]
+     ("over", float), ("aside", float), ("aside_rate", float), ("wanted", float), ("moved", bool),
+     ("speeds", float, SPEEDS_REMEMBERED)]
 )  # fmt: skip
 """A driver beside his random numbers.
 
 His curve until his next model step, the one after it if that is `ahead`, how far on he is in it [-] and how fast he
 moves sideways, by his own clock [m/s]; whether he has begun; whether the vehicle followed the road a step ago, and
 where it was [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate` [m/s], done to `share` [-] of
-`over` [s]; how far he has moved aside, how fast, and how far he wants to; speeds of the last second.
+`over` [s]; how far he has moved aside, how fast, and how far he wants to; whether he has
+ever driven; speeds of the last second.
 """
 
 
@@ -106,6 +108,8 @@ def drive_on(
     most = np.where(is_slow(speed), LARGEST_SINE, 1.0)
     # A car that stands is turned as it came to a stop: of its way in a second of the clock something is left.
     turned = np.where(speed < 0.0, -1.0, 1.0) * np.clip(own_rate / way_of(speed), -most, most)
+    state["moved"] |= moving
+    turned = np.where(state["moved"], turned, 0.0)  # and one that never moved is straight
     heading = np.arcsin(np.clip(np.where(is_driven, turned, sine), -1.0, 1.0))
     state["following"], state["place"], state["own_rate"] = is_driven, place, np.where(is_driven, own_rate, 0.0)
     return state, Moves(place, np.where(is_driven, rate, 0.0), np.where(is_driven, heading, 0.0), is_driven)

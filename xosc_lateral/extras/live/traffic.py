@@ -109,10 +109,15 @@ class Traffic:
         context = self._context(moment) if self.is_due(time) else None
         there = np.flatnonzero(moment.driven)
         drivers = self._present([moment.names[k] for k in there])
-        passed = None if self._time is None else time - self._time
+        passed = 0.0 if self._time is None else time - self._time
+        is_first, is_restart = self._columns is None, self._time is None
         self._time = time
+        if is_restart and not is_first:
+            self._knots = self._knots_until(time) - 1
+            share = time / self._step - self._knots
+            self._state["clock"] = np.minimum(self._state["clock"], share)
         pace = pace_of(moment.speed[there], self._state["own_rate"][drivers])
-        self._state["clock"][drivers] += (passed or 0.0) * pace / self._step
+        self._state["clock"][drivers] += passed * pace / self._step
         if context is not None:
             self._advance(time, moment, context, there, drivers)
         self._turn_over(drivers)
@@ -120,10 +125,20 @@ class Traffic:
         moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
         if len(there):
             rows = (moment.speed[there], moment.offset[there], moment.nominal[there], moment.following[there])
-            self._state[drivers], driven = drive_on(self._state[drivers], self._step, passed, *rows)
+            self._state[drivers], driven = drive_on(
+                self._state[drivers], self._step, None if is_first else passed, *rows
+            )
             for values, part in zip(moves, driven, strict=True):
                 values[there] = part
         return moves
+
+    def restart(self) -> None:
+        """The next step may be at any time: after a pause, a leap above 60 s, in another player.
+
+        The same drivers go on from where their vehicles are then.
+        """
+        self._time, self._knots = None, 0
+        self._state["following"] = False
 
     # ---- who is there ------------------------------------------------------------------------------------------------
     def _present(self, names: list[str]) -> IntArray:
@@ -297,7 +312,7 @@ class Traffic:
         begun = [name for name, is_begun in zip(self._names, self._state["begun"], strict=True) if is_begun]
         if sorted(begun) != sorted(name for _, members in self._groups.values() for name in members):
             raise ValueError("drivers and groups name others")
-        if self._time is None and self._columns is None:
+        if self._time is None and not self._knots:
             return
         if self._time is None or self._columns is None:
             raise ValueError("it says only one of time and columns")

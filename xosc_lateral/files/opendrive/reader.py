@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 from os import PathLike, fspath
 from pathlib import Path
 
@@ -57,7 +58,7 @@ def _network(document: XmlDocument, path: str) -> RoadNetwork:
         for name in ("north", "south", "east", "west"):
             source.number(header, name, 0.0)
     shift = () if offset is None else (source.number(offset, name, 0.0) for name in ("x", "y", "z", "hdg"))
-    return RoadNetwork(
+    network = RoadNetwork(
         roads=roads,
         junctions=junctions,
         path=source.path,
@@ -66,6 +67,33 @@ def _network(document: XmlDocument, path: str) -> RoadNetwork:
         geo_reference=reference.strip() if reference and reference.strip() else None,
         header_offset=HeaderOffset(*shift),
     )
+    _note_contacts(network, elements, source)
+    network.notes = source.notes
+    return network
+
+
+MEETING_GAP = 1.0
+"""Between ends of roads that meet. [m]"""
+
+
+def _note_contacts(network: RoadNetwork, elements: Sequence[XmlElement], source: RoadFile) -> None:
+    """Say which links touch a road at one end while it lies at this place with its other end."""
+    for here, (road, element) in enumerate(zip(network.roads, elements, strict=True)):
+        for what, link, s in (("predecessor", road.predecessor, 0.0), ("successor", road.successor, road.length)):
+            if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
+                continue
+            other = network.index_of(link.element_id)
+            ends = {"start": 0.0, "end": network.roads[other].length}
+            if link.contact not in ends:
+                continue
+            pose = network.road_pose_at(here, s)
+            places = (network.road_pose_at(other, end) for end in (ends.pop(link.contact), *ends.values()))
+            gap, opposite = (hypot(there.x - pose.x, there.y - pose.y) for there in places)
+            if gap > MEETING_GAP > opposite:
+                words = f"contactPoint={link.contact!r} of the {what} of road {road.id!r} contradicts the geometry"
+                source.note(
+                    f"{words}: road {link.element_id!r} meets it with its other end; followed as written", element
+                )
 
 
 def _read_road(

@@ -26,10 +26,11 @@ from xosc_lateral.files.source import guard_input, guarding_inputs
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.event_equivalence import as_played, shrink_until_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
+from xosc_lateral.workflows.conversion.event_equivalence import as_played
 from xosc_lateral.workflows.conversion.plan import Plan, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
-from xosc_lateral.workflows.conversion.result import Drivers, Enriched, LaneChanges
+from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.user_player import told_by_player
@@ -37,6 +38,7 @@ from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
+from xosc_lateral.world.motion.look import compare_parts, worst_of
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.scenario import Scenario
@@ -190,10 +192,12 @@ def sample(plan: Plan) -> Enriched:
 def check(plan: Plan, written: Written) -> Written:
     """Play a reactive output in `EventEquivalence`'s ways of driving, and make moves smaller where they change events.
 
-    A replay follows the clock: nothing can happen otherwise.
+    A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made.
     """
     if plan.is_replay:
-        return written
+        made = (one for one in written.movement.entities if one.is_enriched)
+        found = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
+        return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in found for one in some))
     settings, source = plan.settings, plan.played.scenario
     equivalence = plan.prepared.equivalence(tuple(plan.egos))
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))

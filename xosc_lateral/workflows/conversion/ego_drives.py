@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.conditions import at_time
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape, Priority
-from xosc_lateral.world.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
+from xosc_lateral.world.scenario.private_actions import (
+    AbsoluteTargetLane,
+    AbsoluteTargetSpeed,
+    LaneChangeAction,
+    SpeedAction,
+    TransitionDynamics,
+)
 from xosc_lateral.world.scenario.scenario import Act, Action, Actors, Event, Maneuver, ManeuverGroup, Scenario, Story
 
 CHANGE_START = 1.0
@@ -20,6 +29,10 @@ BRAKING_START, LATEST_BRAKING = 5.0, 15.0
 """When one begins to brake to a stop: from, to. [s]"""
 STANDING_TIME = 2.0
 """For which it stands. [s]"""
+STAYING_RATE = 100.0
+"""How fast one that never comes is at rest: within its length of where it begins. [m/s2]"""
+LANE_CHANGE_START, LANE_CHANGE_TIME = 3.0, 4.0
+"""When one begins to change lanes, for how long. [s]"""
 CHANGE_RATE, BRAKING_RATE = 3.0, 5.0
 """How fast they do so. [m/s2]"""
 
@@ -28,38 +41,73 @@ STORY = "xosc-lateral ego"
 Speeds = tuple[tuple[float, float, float], ...]
 """Of an ego: from a time on [s], to a factor of its initial speed, at a rate. [m/s2]"""
 
-OTHER_RUNS = ("ego at 0.7 times its speed", "ego at 1.3 times its speed", "ego that brakes to a stop")  # of `drives`
+OTHER_RUNS = (
+    "ego at 0.7 times its speed",
+    "ego at 1.3 times its speed",
+    "ego that brakes to a stop",
+    "ego that never comes",
+    "ego that changes lanes",
+)
+"""Of `drives`."""
 
 
-def drives(motion: NominalMotion, egos: Collection[str]) -> tuple[Speeds, ...]:
-    """Ways to drive, the nominal one first: slower, faster, to a stop and on.
+class Drive(NamedTuple):
+    """How vehicles under test drive in a run: their speeds, and the lanes that some change to."""
+
+    speeds: Speeds = ()
+    lanes: Mapping[str, int] = {}
+
+
+def drives(motion: NominalMotion, egos: Collection[str], network: RoadNetwork) -> tuple[Drive, ...]:
+    """Ways to drive, the nominal one first: slower, faster, to a stop and on, not at all, to a lane beside.
 
     The stop is where one who drives as the ego does stands at a joint of roads, if there is one soon.
     """
     speed = max((float(one.speed[0]) for one in motion.entities if one.name in egos), default=0.0)
     if not egos:
-        return ((),)
+        return (Drive(),)
     others = [one for one in motion.entities if one.name not in egos]
     joints = np.concatenate([one.time[1:][np.diff(one.road) != 0] for one in others] or [np.empty(0)])
     starts = joints - 0.5 * speed / BRAKING_RATE
     soon = starts[(starts >= BRAKING_START) & (starts <= LATEST_BRAKING)]
     braking = float(soon.min()) if len(soon) else BRAKING_START
     stopped = braking + speed / BRAKING_RATE + STANDING_TIME
-    return (
-        (),
-        ((CHANGE_START, 0.7, CHANGE_RATE),),
-        ((CHANGE_START, 1.3, CHANGE_RATE),),
-        ((braking, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE)),
+    lanes = {one.name: _lane_beside(one, network) for one in motion.entities if one.name in egos}
+    beside = {name: lane for name, lane in lanes.items() if lane}
+    ways = (
+        Drive(),
+        Drive(((CHANGE_START, 0.7, CHANGE_RATE),)),
+        Drive(((CHANGE_START, 1.3, CHANGE_RATE),)),
+        Drive(((braking, 0.0, BRAKING_RATE), (stopped, 1.0, CHANGE_RATE))),
+        Drive(((0.0, 0.0, STAYING_RATE),)),
     )
+    return (*ways, Drive((), beside)) if beside else ways
 
 
-def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str], speeds: Speeds) -> Scenario:
-    """A scenario in which vehicles under test change their speed."""
+def _lane_beside(ego: EntityMotion, network: RoadNetwork) -> int:
+    """Where it can change to when it does; 0: there is none."""
+    row = min(int(np.searchsorted(ego.time, LANE_CHANGE_START)), len(ego.time) - 1)
+    road, lane, s = int(ego.road[row]), int(ego.lane[row]), float(ego.s[row])
+    there = {one.id: one.type for one in network.lanes_at(road, s)} if road >= 0 else {}
+    both = (lane + np.sign(lane) * side for side in (-1, 1))  # towards the middle of the road first
+    return next((int(one) for one in both if one and there.get(int(one)) in DRIVING), 0)
+
+
+def with_speeds(
+    scenario: Scenario, motion: NominalMotion, egos: Collection[str], speeds: Speeds, lanes: Mapping[str, int] = {}
+) -> Scenario:
+    """A scenario in which vehicles under test change their speed, and some of them their lane."""
     place = scenario.storyboard.place
     groups = []
     for entity in motion.entities:
         if entity.name in egos:
             events = []
+            if entity.name in lanes:
+                name = f"{STORY} {entity.name} changes lanes"
+                across = TransitionDynamics(DynamicsShape.SINUSOIDAL, DynamicsDimension.TIME, LANE_CHANGE_TIME)
+                change = LaneChangeAction(AbsoluteTargetLane(lanes[entity.name]), across, place=place)
+                trigger = at_time(LANE_CHANGE_START, STORY, place)
+                events.append(Event(name, Priority.OVERRIDE, (Action(name, change, place, True),), trigger, place))
             for moment, factor, rate in speeds:
                 name = f"{STORY} {entity.name} at {moment:g} s"
                 dynamics = TransitionDynamics(DynamicsShape.LINEAR, DynamicsDimension.RATE, rate)

@@ -17,10 +17,10 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT, REACHED
 from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept, why_untouched
 from xosc_lateral.workflows.conversion.consequences import stays_as_written
-from xosc_lateral.workflows.conversion.movement import DRIVING_SPEED
 from xosc_lateral.workflows.conversion.plan import Plan
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.world.motion.driver_clock import DriverClock
+from xosc_lateral.world.motion.look import DRIVING_SPEED
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.offset_path import (
     LEAST_GAP,
@@ -235,20 +235,25 @@ class _Phases:
 
     def already_there(self) -> Iterator[OffsetPath]:
         """What ends actions of the source that are over at once in one of its runs, after the same ones as there."""
-        found = dict[tuple[Path, Path | None], set[Path]]()
+        found, moves = dict[tuple[Path, Path | None], set[Path]](), set[tuple[Path, Path | None]]()
         for entity, run in self._runs:
             own = sorted((one for one in run.actions if one.path in self._lateral), key=lambda one: one.start)
             own = [one for one in own if one.actor == entity.name]
             for k, one in enumerate(own):
+                if not isinstance(one.action.content, LaneChangeAction | LaneOffsetAction):
+                    continue
                 rows = np.searchsorted(entity.time, (one.start - run.step, one.end or np.inf))
-                is_short = isinstance(one.action.content, LaneChangeAction | LaneOffsetAction) and rows[1] - rows[0] < 4
-                places = [column[rows] for column in (entity.lane, entity.offset)] if is_short else [np.arange(2.0)]
-                if all(abs(first - last) < LEAST_MOVE for first, last in places):
-                    before = [earlier.path for earlier in own[:k]]
-                    found[one.path, before[-1] if before else None] = {*before, one.path}
+                places = [column[rows[0] : rows[1] + 1] for column in (entity.lane, entity.offset)]
+                before = [earlier.path for earlier in own[:k]]
+                which = one.path, before[-1] if before else None
+                if rows[1] - rows[0] < 4 and all(float(np.ptp(place)) < LEAST_MOVE for place in places):
+                    found[which] = {*before, one.path}
+                else:
+                    moves.add(which)  # what came before does not tell them apart
         at = np.arange(0.0, LEAST_LENGTH, SHORTEST_GAP)
         straight = (PathPiece(at, np.zeros(len(at))),)
-        for (path, after), begun in found.items():
+        for path, after in found.keys() - moves:
+            begun = found[path, after]
             unless = tuple(sorted(self._lateral - begun))
             yield OffsetPath(self._entity.name, after, straight, over=path, unless=unless)
 

@@ -27,6 +27,7 @@ from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.controllers import (
     BY_NAME,
+    NEARLY_NAMED,
     Control,
     controlled_entities,
     named_under_test,
@@ -208,6 +209,9 @@ def other_egos(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str,
     by_name = [repr(name) for name, why in egos.items() if why == BY_NAME]
     if len(by_name) > 1:
         return (f"{' and '.join(by_name)} are called like vehicles under test, and all left as written: {which}",)
+    if not egos:
+        near = [one.name for one in scenario.entities if one.is_vehicle and NEARLY_NAMED.search(one.name)]
+        return tuple(f"{name!r} is replayed: if it is the vehicle under test, say --ego {name!r}" for name in near)
     marked = " and ".join(f"{name!r} ({why})" for name, why in egos.items())
     others = [name for name in named_under_test(scenario) if name not in egos]
     return tuple(

@@ -24,6 +24,7 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.rates import rate
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
+from xosc_lateral.world.motion.look import STORY_PREFIX, Finding
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition
@@ -39,6 +40,8 @@ from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions
 
 EVENT_TOLERANCE = 0.05
 """By which an event may be earlier or later beyond what is explained: a frame of a coarse player. [s]"""
+NOTICED = 0.03
+"""Earlier or later by more, an event moves others. [s]"""
 ROUNDING = 1e-6
 """Of times that are sums of frames. [s]"""
 LARGEST_DELAY_RATIO = 3.0
@@ -46,8 +49,6 @@ LARGEST_DELAY_RATIO = 3.0
 speed. What is later by more is told. [-]"""
 LEAST_WAY = 1e-3
 """A lateral action over less than this has no duration to compare. [m]"""
-STORY_PREFIX = "xosc-lateral"
-"""Begins the names of stories that we add."""
 
 Path = tuple[str, ...]
 Key = tuple[Path, str | None, int]
@@ -70,6 +71,11 @@ class Change(Struct, frozen=True):
         return str(self.note)
 
     @property
+    def about(self) -> str:
+        """Which it is, whenever it comes."""
+        return self.what.rpartition(" at ")[0] or self.what
+
+    @property
     def note(self) -> Note:
         """It as a warning."""
         what = f"{self.what} {self.how} with the offsets"
@@ -81,9 +87,18 @@ class Comparison(Struct, frozen=True):
 
     shifts: tuple[EventShift, ...]
     changes: tuple[Change, ...]
+    findings: tuple[Finding, ...] = ()  # how vehicles move otherwise, and where they are elsewhere
+    by_chance: tuple[Change, ...] = ()  # what hangs on a frame: the source does it otherwise, too, in other frames
     # moving: share of each vehicle's driving time in which it moves sideways; None: it does not drive [-]
     moving: Mapping[str, float | None] = {}
     run: str = ""  # how vehicles under test drive in both
+
+    @property
+    def first(self) -> float:
+        """When something first comes earlier or later, or happens otherwise. [s]"""
+        starts = (one.time for one in self.shifts if abs(one.start) > NOTICED)
+        ends = (one.time + one.duration for one in self.shifts if abs(one.end) > NOTICED)
+        return min((*starts, *ends, *(one.time for one in self.changes)), default=inf)
 
 
 def compare_runs(
@@ -96,7 +111,7 @@ def compare_runs(
     ends: bool = True,
 ) -> Comparison:
     """Compare runs with and without offsets; `ignored` entities may end in any lane and touch; `ends`: both at once."""
-    then, now = _runs(before.actions), _runs(after.actions)
+    then, now = runs_of(before.actions), runs_of(after.actions)
     shifts = _Shifts(scenario, network, before, after)
     changes: dict[str, Change] = {}
     event_shifts = []
@@ -117,9 +132,10 @@ def compare_runs(
             if abs(rest) > max(EVENT_TOLERANCE, before.step, after.step) + ROUNDING:
                 changes.setdefault(what, Change(what, key[1], action.start, f"{how} {later(moved)}", moved))
     for key, action in now.items():
-        if key not in then and (*key[:2], 0) in then and action.start <= before.end_time - EVENT_TOLERANCE:
-            what = _named(key, action)
-            changes.setdefault(what, Change(what, key[1], action.start, "happens once more"))
+        if key not in then and action.start <= before.end_time - EVENT_TOLERANCE:
+            what, first = _named(key, action), (*key[:2], 0) not in then
+            how = "is new" if first else "happens once more"
+            changes.setdefault(what, Change(what, key[1], action.start, how))
     others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
@@ -144,7 +160,7 @@ def _named(key: Key, action: PlayedAction) -> str:
     return f"event '{path[-2] if len(path) > 1 else path[-1]}'{whose} at {action.start:.2f} s"
 
 
-def _runs(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
+def runs_of(actions: Sequence[PlayedAction]) -> dict[Key, PlayedAction]:
     """Actions of the source's events, counted for those that run several times, up to `limits.REPEATED_RUNS`."""
     runs: dict[Key, PlayedAction] = {}
     numbers: dict[tuple[Path, str | None], int] = {}

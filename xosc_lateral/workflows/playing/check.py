@@ -18,6 +18,7 @@ from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRo
 from xosc_lateral.world.player.distances import HEIGHT_APART
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.world.scenario.private_actions import LongitudinalDistanceAction
 
 LEAP_DISTANCE = 0.3
 """Further than who drives and slides aside at `MAXIMUM_LATERAL_SPEED`, and aside by this much more: a leap. [m]"""
@@ -36,7 +37,7 @@ def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str
     notes: list[Note] = []
     for entity in motion.entities:
         if entity.name not in trailers:
-            notes += _jumps(entity)
+            notes += _jumps(entity, motion, network)
         if entity.entity.is_vehicle:
             notes += _lanes_for_nobody(entity, network)
     for route in motion.routes:
@@ -45,15 +46,30 @@ def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str
     return tuple(notes)
 
 
-def _jumps(entity: EntityMotion) -> Iterator[Note]:
-    """The first jump that nobody asked for, and how many there are."""
+def _jumps(entity: EntityMotion, motion: NominalMotion, network: RoadNetwork) -> Iterator[Note]:
+    """The first jump that nobody asked for, what made it, and how many there are."""
     jumps = leaps(entity)
-    if jumps:
-        (time, length), more = jumps[0], f" ({len(jumps)} times in all)" if len(jumps) > 1 else ""
-        why = "further than its speed explains: the lane that it follows ends, or its road has a gap"
-        yield entity.entity.place.note(
-            f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, {why}", is_warning=True
-        )
+    if not jumps:
+        return
+    (time, length), more = jumps[0], f" ({len(jumps)} times in all)" if len(jumps) > 1 else ""
+    row = int(np.argmin(np.abs(entity.time - time)))
+    before, here = (int(road) for road in entity.road[[row - 1, row]])
+    at_once = [
+        one
+        for one in motion.actions
+        if one.actor == entity.name
+        and isinstance(one.action.content, LongitudinalDistanceAction)
+        and one.start <= time and (one.end is None or one.end > time - 2.0 * motion.step)
+    ]  # fmt: skip
+    place, why = entity.entity.place, "the lane that it follows ends, or its road has a gap"
+    if at_once:
+        place = at_once[0].action.place
+        why = "a LongitudinalDistanceAction without dynamic constraints puts it at its distance at once"
+    elif before != here and min(before, here) >= 0:
+        ids = network.road_ids
+        why = f"road '{ids[before]}' is linked to road '{ids[here]}', which does not begin where it ends"
+    what = f"'{entity.name}' jumps {length:.1f} m at {time:.2f} s{more}, further than its speed explains: {why}"
+    yield place.note(what, is_warning=True)
 
 
 def leaps(motion: EntityMotion) -> list[tuple[float, float]]:

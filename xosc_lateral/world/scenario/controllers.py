@@ -215,11 +215,17 @@ EXTERNAL_ENTITIES: Mapping[str, frozenset[str]] = {
 }
 """Property of a vehicle -> values that leave it to somebody else; both in lower case."""
 
+_WORDS, _KINDS = "ego|hero|vut|sut|dut|host", "vehicle|car|truck|van|bus|vut|sut"
 NAMED_UNDER_TEST = re.compile(
-    r"((ego|hero|vut|sut|host)([ _-]?(vehicle|car))?|subject[ _-]?(vehicle|car))[ _-]?\d*", re.IGNORECASE
+    rf"(({_WORDS})[ _-]?({_KINDS})?|ego[ _-][a-z]{{2}}|(vehicle|car|truck)[ _-]?ego|subject[ _-]?(vehicle|car)"
+    r"|(vehicle|system|device|car)[ _-]?under[ _-]?test)[ _-]?\d*",
+    re.IGNORECASE,
 )
 """What the field calls the vehicle under test: esmini and CARLA (`hero`, `ego_vehicle`), Euro NCAP (VUT), UN R157
-(ego), ISO 34501 (subject vehicle), ASAM OSI (host vehicle)."""
+(ego), ISO 34501 (subject vehicle), ASAM OSI (host vehicle); two letters behind a dash are a maker's (`Ego_VW`)."""
+
+NEARLY_NAMED = re.compile(r"(^|[^a-z])(ego|hero|vut|sut|dut)([^a-z]|$)", re.IGNORECASE)
+"""A name with such a word in it, which may say who drives beside the vehicle under test (`Ego_Ghost`)."""
 
 
 BY_NAME = "by its name"

@@ -815,14 +815,24 @@ static void move(DRIVER_state *driver, double passed, const DRIVER_inputs *in, D
     const int follows = is_set(in->following), followed = is_set(driver->was_following);
     const double pace = pace_of(in->speed, driver->own_rate), rate = slope / DRIVER_STEP * pace;
     double own_rate, most;
-    if (follows && !followed && driver->stepped != 0) {
+    if (driver->stepped == 0 || is_set(driver->paused)) {
+        driver->place = in->position;
+    }
+    /* who drives, began so; who is slow or stands stays where it is, and is led over as it drives off */
+    if (follows && driver->stepped == 0 && pace < 1.0) {
+        lead_over(driver, driver->place - own, 0.0, in->speed);
+    } else if (follows && !followed && driver->stepped != 0) {
         lead_over(driver, driver->place - own + rate * passed, -rate, in->speed);
+    }
+    driver->paused = 0.0;
+    if (in->speed > STANDSTILL) {
+        driver->moved = 1.0;
     }
     own_rate = slope / DRIVER_STEP + settle(driver, passed * pace);
     out->offset = follows ? own + driver->rest : in->position;
     out->rate = follows ? own_rate * pace_of(in->speed, own_rate) : 0.0;
     most = is_slow(in->speed) ? LARGEST_SINE : 1.0;
-    out->heading = follows ? asin(fmin(fmax(own_rate / way_of(in->speed), -most), most)) : 0.0;
+    out->heading = follows && is_set(driver->moved) ? asin(fmin(fmax(own_rate / way_of(in->speed), -most), most)) : 0.0;
     driver->own_rate = follows ? own_rate : 0.0;
     driver->was_following = follows ? 1.0 : 0.0;
     driver->place = out->offset;
@@ -850,7 +860,7 @@ static unsigned fault_of(const DRIVER_inputs *inputs, double *columns) {
     if (isnan(inputs->following)) {
         fault = FAULT_FOLLOWING;
     }
-    if (!is_set(inputs->following) && !(fabs(inputs->position) <= FARTHEST_POSITION)) {
+    if (!(fabs(inputs->position) <= FARTHEST_POSITION)) {
         fault = FAULT_POSITION;
     }
     for (k = 0; k < COLUMNS; k++) {
@@ -898,6 +908,23 @@ DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs) {
         driver->looked++;
         driver->foresees = 1;
         take_row(driver, columns);
+    }
+    return refused(driver, fault);
+}
+
+DRIVER_status DRIVER_restart(DRIVER_state *driver, double time) {
+    double u;
+    unsigned fault = driver->profile == PROFILE ? 0U : (unsigned)FAULT_START;
+    if (fault == 0U && !(time >= driver->begun_at && fabs(time) <= LATEST_TIME)) {
+        fault = FAULT_TIME;
+    }
+    if (fault == 0U && driver->stepped != 0) {
+        u = (time - driver->begun_at) / DRIVER_STEP;
+        driver->knots = (int64_t)floor(u + 1e-9);
+        driver->clock = fmin(driver->clock, fmax(u - (double)driver->knots, 0.0));
+        driver->time = time;
+        driver->was_following = 0.0;
+        driver->paused = 1.0;
     }
     return refused(driver, fault);
 }

@@ -46,7 +46,7 @@ typedef enum { DRIVER_OK = 0, DRIVER_REFUSED = 1 } DRIVER_status;
  * distance: nobody within reach. */
 typedef struct {
 @INPUTS@
-    double position;  /* Where the vehicle is while it does not follow. [m] */
+    double position;  /* Where the vehicle is while it does not follow, at its first step and after a restart. [m] */
     double following; /* Not 0: it follows the road, and is where its driver says. */
 } DRIVER_inputs;
 
@@ -86,7 +86,7 @@ typedef struct {
     DRIVER_hidden_state hidden[DRIVER_HIDDEN];
     double coefficients[DRIVER_COMPONENTS], history[DRIVER_ROWS][DRIVER_COMPONENTS + 1], settled[DRIVER_LAGS];
     double samples[4], curve[6], next[6];
-    double was_following, place, clock, ahead, own_rate, rest, from, from_rate, share, over, heeded[5], owed, pace;
+    double was_following, place, clock, ahead, own_rate, rest, from, from_rate, share, over, heeded[5], owed, pace, moved, paused;
 } DRIVER_state;
 
 /* A lane of the profile's own width, at 30 m/s, and nobody around. */
@@ -103,6 +103,10 @@ DRIVER_status DRIVER_look(DRIVER_state *driver, const DRIVER_inputs *inputs);
 /* Where the driver is at a time, not before the last one and at most 60 s after it; the first is where it began. The
  * model goes on every 0.2 s, on the inputs of the call that reaches its time. Refused: nothing has changed. */
 DRIVER_status DRIVER_step(DRIVER_state *driver, double time, const DRIVER_inputs *inputs, DRIVER_outputs *outputs);
+
+/* After a pause, a leap of time or in another player: the same driver goes on at a time not before he began, from the
+ * `position` of the next step. */
+DRIVER_status DRIVER_restart(DRIVER_state *driver, double time);
 
 /* Why the last call was refused; "" if it was not. */
 const char *DRIVER_message(const DRIVER_state *driver);

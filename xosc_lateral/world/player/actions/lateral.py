@@ -14,6 +14,9 @@ from xosc_lateral.world.road.lanes import beside
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction, LaneOffsetAction
 
+STANDING_TURN = 0.25 * pi
+"""Nobody who drives turns so far across his lane. [rad]"""
+
 
 class RunningLaneChange(RunningToTarget):
     """From the present lateral position to the target lane, while moving on.
@@ -195,6 +198,9 @@ class RunningLaneOffset(RunningToTarget):
             state.move_to(state.road, state.lane, state.s, offset)
             speed = state.speed or EPSILON
             turn = atan(transition.slope() / speed)
+            if abs(turn) > STANDING_TURN:
+                what = "moves sideways while it hardly drives, and is turned across its lane (in esmini not alike)"
+                self.note(f"'{state.name}' {what}")
             state.turn(along + (turn if state.is_forward else -turn))
         transition.advance(step)
 

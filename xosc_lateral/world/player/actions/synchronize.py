@@ -58,6 +58,8 @@ class RunningSynchronize(RunningPrivateAction):
         """Places are looked up once."""
         self._own_spot = spot_at(self.content.target_position, self.simulation)()
         self._master_spot = spot_at(self.content.target_position_master, self.simulation)()
+        if self._way_to(self.actor, self._own_spot, self.content.target_position) < 0.0:
+            self.note(f"the place of '{self.actor.name}' lies behind it: at its final speed at once (not so in esmini)")
         self._mode = SpeedPhase.NONE
         self._last = (UNREACHABLE_DISTANCE, UNREACHABLE_DISTANCE)
 

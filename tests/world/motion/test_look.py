@@ -1,0 +1,67 @@
+"""What is planted in a vehicle's motion is seen, with its time and size; what is as it was is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.track import Track
+from xosc_lateral.world.motion.look import compare_tracks
+
+STEP = 0.02
+TIME = STEP * np.arange(1000)
+
+
+def track(speed: FloatArray, aside: FloatArray, turned: FloatArray | float = 0.0, bend: float = 0.0) -> Track:
+    """Along a circle of this curvature [1/m], so far to its left [m], turned against its way. [rad]"""
+    way = np.concatenate(([0.0], np.cumsum(0.5 * STEP * (speed[1:] + speed[:-1]))))
+    course = bend * way
+    x, y = (np.sin(course) / bend, (1.0 - np.cos(course)) / bend) if bend else (way, np.zeros(len(way)))
+    slope = np.arctan2(np.gradient(aside, STEP), np.maximum(speed, 1.0))
+    columns = {
+        "x": x - aside * np.sin(course), "y": y + aside * np.cos(course), "speed": speed,
+        "heading": course + slope + turned,
+    }  # fmt: skip
+    return Track("A", TIME, columns, np.empty(0, dtype=np.intp))
+
+
+EVEN, NONE = np.full(len(TIME), 20.0), np.zeros(len(TIME))
+SWAYING = 0.3 * np.sin(0.8 * TIME)
+STOPPING = np.clip(np.abs(TIME - 10.0) - 2.0, 0.0, 5.0)
+LATER = (TIME >= 10.0).astype(np.float64)
+
+
+@pytest.mark.parametrize("bend", [0.0, 0.02])
+@pytest.mark.parametrize("speed", [EVEN, STOPPING], ids=["even", "stopping"])
+def test_a_driver_s_movement_is_no_finding(speed: FloatArray, bend: float) -> None:
+    moves = SWAYING if speed is EVEN else 0.3 * np.sin(0.04 * np.cumsum(speed) * STEP)
+    source = track(speed, NONE, bend=bend)
+    assert not list(compare_tracks(source, source))
+    assert not list(compare_tracks(source, track(speed, moves, bend=bend)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "size", "speed", "change"),
+    [
+        ("corner", "40 mrad in a frame", 0.04, EVEN, {"turned": 0.04 * LATER}),
+        ("corner", "m/s2 sideways", 5.0, EVEN, {"aside": 0.05 * np.sin(10.0 * TIME)}),
+        ("heading", "is turned by 4.0 degrees", 0.0698, EVEN, {"turned": 0.00698 * TIME.clip(0.0, 10.0)}),
+        ("elsewhere", "2.00 m elsewhere along the road", 2.0, EVEN, {"speed": EVEN + 0.2 * LATER}),
+        ("creeps", "moves by 20 mm while it stands", 0.02, STOPPING, {"aside": 0.02 * np.clip(TIME - 9.0, 0.0, 1.0)}),
+        ("turns at rest", "turns by 20 mrad while it stands", 0.02, STOPPING, {"turned": 0.02 * LATER}),
+    ],
+)  # fmt: skip
+def test_what_is_planted_is_found_with_its_size(
+    kind: str, words: str, size: float, speed: FloatArray, change: dict[str, FloatArray]
+) -> None:
+    made = {"speed": speed, "aside": NONE, **change}
+    found = {one.kind: one for one in compare_tracks(track(speed, NONE), track(**made))}
+    assert words in found[kind].what and found[kind].size == pytest.approx(size, rel=0.06)
+    assert words in str(found[kind].note("nominal")) and "(run: nominal)" in str(found[kind].note("nominal"))
+
+
+def test_a_place_is_not_judged_by_the_strict_limit_after_an_event_has_moved() -> None:
+    source, late = track(EVEN, NONE), track(EVEN + 0.12 * LATER, NONE)
+    assert [one.kind for one in compare_tracks(source, late)] == ["elsewhere"]
+    assert not list(compare_tracks(source, late, shifted=10.0))
