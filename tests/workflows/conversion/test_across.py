@@ -36,19 +36,29 @@ def test_a_car_that_an_ego_calls_takes_the_way_of_drivers(tmp_path: Path) -> Non
     assert made.modes == {"A": "lane-offset"} and not made.warnings
     played = play_scenario(tmp_path / "out.xosc")
     (action,) = (one for one in played.motion.actions if "change" in one.path)
+    assert action.start == pytest.approx(begin, abs=0.05) and begin > 3.0
+    assert action.end - action.start == pytest.approx(5.0, abs=0.05)  # whoever waits for its end is not kept waiting
     # a sinusoid of 5 s is at a tenth and at nine tenths of its way when the bell is
     tenths, bell = 5.0 / np.pi * np.arccos([0.8, -0.8]), beta(ALPHA, BETA)
     duration = np.ptp(tenths) / np.ptp(bell.ppf([0.1, 0.9]))
-    over = tenths[0] + duration * (1.0 - bell.ppf(0.1))
-    assert action.start == pytest.approx(begin, abs=0.05) and begin > 3.0
-    assert action.end - action.start == pytest.approx(over, abs=0.05)
     car = next(one for one in played.motion.entities if one.name == "A")
     right = -car.offset + WIDTH * (car.lane[0] - car.lane)
-    rows = (car.time > begin) & (car.time < begin + over)
+    rows = (car.time > begin) & (car.time < begin + 5.0)
     done = bell.cdf((car.time[rows] - begin - tenths[0]) / duration + bell.ppf(0.1))
     beside = right[rows] - right[rows][0] - WIDTH * done  # what moves the driver in his lane goes on
     assert 0.02 < np.ptp(beside) < 0.6
     assert np.abs(np.diff(beside)).max() < 0.3 * played.motion.step  # [m]: 0.3 m/s
+    ends = [end_of(tmp_path, seed) for seed in range(4)]
+    assert 0.05 < np.std(ends) < 0.6
+
+
+def end_of(folder: Path, seed: int) -> float:
+    """How far left of the middle of its new lane A is when its lane change is over, with another driver. [m]"""
+    xl.convert(folder / "made.xosc", folder / f"{seed}.xosc", seed=seed, lane_changes="lifelike")
+    motion = play_scenario(folder / f"{seed}.xosc").motion
+    (action,) = (one for one in motion.actions if "change" in one.path)
+    car = next(one for one in motion.entities if one.name == "A")
+    return float(np.interp(action.end, car.time, car.offset))
 
 
 @pytest.mark.parametrize("factor", [0.97, 1.2])
@@ -77,21 +87,26 @@ def test_the_output_is_valid_and_keeps_event_and_trigger(tmp_path: Path, version
     assert event.find("StartTrigger//TimeHeadwayCondition") is not None
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>', "that of 'Ego'"),
-        ("<StopTrigger>", f"<StopTrigger>{OVER}", "'over' waits for its end"),
-    ],
-)
-def test_what_is_not_known_before_stays_as_written_and_is_named(tmp_path: Path, old: str, new: str, why: str) -> None:
+def test_who_waits_for_its_end_is_not_kept_waiting(tmp_path: Path) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    path.write_text(path.read_text().replace("<StopTrigger>", f"<StopTrigger>{OVER}"))
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    assert not made.warnings and "FollowTrajectoryAction" in (tmp_path / "out.xosc").read_text()
+    ends = [play_scenario(one).motion.end_time for one in (path, tmp_path / "out.xosc")]
+    assert ends[1] == pytest.approx(ends[0], abs=0.05)
+
+
+def test_what_is_not_known_before_keeps_the_written_way_and_ends_where_its_driver_is(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new))
+    assert '<AbsoluteTargetLane value="-2"/>' in text
+    path.write_text(text.replace('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>'))
     made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
-    assert [line for line in made.warnings if "of 'A' at" in line and "stays as written" in line and why in line]
-    assert "<LaneChangeAction>" in (tmp_path / "out.xosc").read_text()
+    assert [line for line in made.warnings if "of 'A' at" in line and "that of 'Ego'" in line]
+    (kept,) = etree.parse(str(tmp_path / "out.xosc")).iterfind(".//Event[@name='change']//LaneChangeAction")
+    assert 0.005 < abs(float(kept.get("targetLaneOffset"))) < 1.0
+    ends = [end_of(tmp_path, seed) for seed in range(4)]
+    assert 0.05 < np.std(ends) < 0.6
 
 
 @pytest.mark.skipif(not REAL, reason="ESMINI_LIBRARY names no library of esmini")
