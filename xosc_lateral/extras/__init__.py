@@ -28,6 +28,7 @@ CALLS = {
     "detect": "extras.detect.call",
     "dossier": "extras.dossier.call",
     "import_drives": "extras.recordings.importers",
+    "read_maneuvers": "extras.recordings.maneuvers",
     "live_esmini": "extras.live.call",
     "live_sumo": "extras.live.call",
     "Traffic": "extras.live.traffic",
@@ -48,7 +49,6 @@ CALLS = {
 """Public name -> module that has it."""
 
 SERVICES = {
-    "read_maneuvers": "extras.recordings.maneuvers",
     "recognised": "extras.recordings.importers.foreign_table",
     "mapping_text": "extras.recordings.importers.foreign_table",
 }

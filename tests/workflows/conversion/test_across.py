@@ -100,7 +100,9 @@ def test_what_is_not_known_before_keeps_the_written_way_and_ends_where_its_drive
     path = scenario(tmp_path, trigger=TRIGGER)
     text = path.read_text()
     assert '<AbsoluteTargetLane value="-2"/>' in text
-    path.write_text(text.replace('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>'))
+    path.write_text(
+        text.replace('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>')
+    )
     made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
     assert [line for line in made.warnings if "of 'A' at" in line and "that of 'Ego'" in line]
     (kept,) = etree.parse(str(tmp_path / "out.xosc")).iterfind(".//Event[@name='change']//LaneChangeAction")
