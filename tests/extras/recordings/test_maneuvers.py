@@ -40,12 +40,14 @@ def changing(number: int, duration: float, *, left: bool, ahead: float) -> pd.Da
 
 
 DURATIONS = np.linspace(5.0, 9.0, 24)
+AHEAD = 60.0 + 4.0 * (7 * np.arange(24) % 24)
+"""Of the leader, which loses 2 m/s for 20 s until the begin. [m]"""
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("changes")
-    rows = [changing(k, one, left=k % 4 > 0, ahead=90.0) for k, one in enumerate(DURATIONS)]
+    rows = [changing(k, one, left=k % 4 > 0, ahead=float(AHEAD[k])) for k, one in enumerate(DURATIONS)]
     pd.concat(rows).to_csv(folder / "tracks.csv", index=False)
     return folder / "tracks.csv", two_lanes_each_way(folder)
 
@@ -57,7 +59,9 @@ def found(recording: tuple[Path, Path]) -> Maneuvers:
 
 def test_lane_changes_of_a_recording_are_those_that_were_driven(found: Maneuvers) -> None:
     assert found.changes == 24 and found.behind.value == 1.0 and found.given_up.value == 0.0
-    assert abs(found.duration(0.0, 50.0) - np.median(DURATIONS)) < 0.6  # 90 m less 2 m/s for 20 s
+    assert abs(found.gap.value / np.exp(np.log(AHEAD - 40.0).mean()) - 1.0) < 0.05
+    assert abs(found.duration(0.0, 50.0) - np.median(DURATIONS)) < 0.6
+    assert found.gap_exponent.low < 0.0 < found.gap_exponent.high
     assert found.spread_behind.low < np.std(np.log(DURATIONS)) < found.spread_behind.high
     assert found.left.low < 0.75 < found.left.high
     keeping = (48.0 * 40.0 - DURATIONS.sum()) / 3600.0

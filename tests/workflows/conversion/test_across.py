@@ -32,8 +32,9 @@ XSD = Path(__file__).resolve().parents[2] / "data/xsd"
 def test_a_car_that_an_ego_calls_takes_the_way_of_drivers(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     (begin,) = (one.start for one in play_scenario(path).motion.actions if "change" in one.path)
-    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
     assert made.modes == {"A": "lane-offset"} and not made.warnings
+    assert [line for line in made.notes if "lane change of 'A' at" in line and "is its driver's" in line]
     played = play_scenario(tmp_path / "out.xosc")
     (action,) = (one for one in played.motion.actions if "change" in one.path)
     assert action.start == pytest.approx(begin, abs=0.05) and begin > 3.0
@@ -54,7 +55,7 @@ def test_a_car_that_an_ego_calls_takes_the_way_of_drivers(tmp_path: Path) -> Non
 
 def end_of(folder: Path, seed: int) -> float:
     """How far left of the middle of its new lane A is when its lane change is over, with another driver. [m]"""
-    xl.convert(folder / "made.xosc", folder / f"{seed}.xosc", seed=seed, lane_changes="lifelike")
+    xl.convert(folder / "made.xosc", folder / f"{seed}.xosc", seed=seed)
     motion = play_scenario(folder / f"{seed}.xosc").motion
     (action,) = (one for one in motion.actions if "change" in one.path)
     car = next(one for one in motion.entities if one.name == "A")
@@ -66,7 +67,7 @@ def test_whenever_the_ego_calls_it_ends_in_the_same_lane_and_moves_on_about_its_
     tmp_path: Path, factor: float
 ) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
-    xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    xl.convert(path, tmp_path / "out.xosc", seed=2)
     played = play_scenario(tmp_path / "out.xosc")
     endless = replace(played.scenario, storyboard=structs.replace(played.scenario.storyboard, stop_trigger=None))
     motion = play(with_speeds(endless, played.motion, ["Ego"], ((1.0, factor, 3.0),)), played.network, time_limit=40.0)
@@ -79,7 +80,7 @@ def test_whenever_the_ego_calls_it_ends_in_the_same_lane_and_moves_on_about_its_
 @pytest.mark.parametrize("version", ["1.0", "1.2"])
 def test_the_output_is_valid_and_keeps_event_and_trigger(tmp_path: Path, version: str) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
-    xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike", version=version)
+    xl.convert(path, tmp_path / "out.xosc", seed=2, version=version)
     root = etree.parse(str(tmp_path / "out.xosc"))
     etree.XMLSchema(etree.parse(str(XSD / f"OpenSCENARIO-{version}.0.xsd"))).assertValid(root)
     (event,) = root.iterfind(".//Event[@name='change']")
@@ -90,7 +91,7 @@ def test_the_output_is_valid_and_keeps_event_and_trigger(tmp_path: Path, version
 def test_who_waits_for_its_end_is_not_kept_waiting(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     path.write_text(path.read_text().replace("<StopTrigger>", f"<StopTrigger>{OVER}"))
-    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
     assert not made.warnings and "FollowTrajectoryAction" in (tmp_path / "out.xosc").read_text()
     ends = [play_scenario(one).motion.end_time for one in (path, tmp_path / "out.xosc")]
     assert ends[1] == pytest.approx(ends[0], abs=0.05)
@@ -103,8 +104,8 @@ def test_what_is_not_known_before_keeps_the_written_way_and_ends_where_its_drive
     path.write_text(
         text.replace('<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>')
     )
-    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike")
-    assert [line for line in made.warnings if "of 'A' at" in line and "that of 'Ego'" in line]
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
+    assert [line for line in made.notes if "of 'A' at" in line and "that of 'Ego'" in line]
     (kept,) = etree.parse(str(tmp_path / "out.xosc")).iterfind(".//Event[@name='change']//LaneChangeAction")
     assert 0.005 < abs(float(kept.get("targetLaneOffset"))) < 1.0
     ends = [end_of(tmp_path, seed) for seed in range(4)]
@@ -114,5 +115,5 @@ def test_what_is_not_known_before_keeps_the_written_way_and_ends_where_its_drive
 @pytest.mark.skipif(not REAL, reason="ESMINI_LIBRARY names no library of esmini")
 def test_esmini_plays_it_as_the_source(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
-    made = xl.convert(path, tmp_path / "out.xosc", seed=2, lane_changes="lifelike", player_library=REAL)
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2, player_library=REAL)
     assert "RoutingAction" in (tmp_path / "out.xosc").read_text() and not made.warnings

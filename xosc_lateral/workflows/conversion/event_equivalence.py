@@ -147,7 +147,7 @@ class EventEquivalence:
             changes = tuple(structs.replace(one, run=name) for one in (*comparison.changes, *movement))
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
             comparisons[k] = Comparison(shifts, changes, shares, name)
-            if len(_changes(comparisons.values())) >= most:
+            if len(changes_of(comparisons.values())) >= most:
                 break
         self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
         return [comparisons[k] for k in sorted(comparisons)], nominal_run
@@ -255,7 +255,7 @@ def shrink_until_equivalent(
         return [path for path in driven if path.pieces or path.settles]
 
     output, comparisons = attempt(paths, inf)
-    changes = _changes(comparisons)
+    changes = changes_of(comparisons)
     stuck = set[tuple[int, int]]()
     while changes and trials < MOST_TRIALS:
         blamed = _blamed(changes, paths, motion, sizes, stuck)
@@ -265,8 +265,8 @@ def shrink_until_equivalent(
             trial = sizes | {blamed: smaller}
             made, outcome = attempt(applied(trial), len(changes))
             trials += 1
-            if len(_changes(outcome)) < len(changes):
-                sizes, output, comparisons, changes = trial, made, outcome, _changes(outcome)
+            if len(changes_of(outcome)) < len(changes):
+                sizes, output, comparisons, changes = trial, made, outcome, changes_of(outcome)
                 break
         else:
             stuck.add((blamed, len(changes)))
@@ -277,7 +277,7 @@ def shrink_until_equivalent(
     return output, EquivalentPaths(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
 
 
-def _changes(comparisons: Iterable[Comparison]) -> list[Change]:
+def changes_of(comparisons: Iterable[Comparison]) -> list[Change]:
     """Each once."""
     return list({change.what: change for comparison in comparisons for change in comparison.changes}.values())
 
