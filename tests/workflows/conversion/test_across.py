@@ -13,8 +13,10 @@ from msgspec import structs
 from scipy.stats import beta
 
 import xosc_lateral as xl
-from tests.world.motion.test_crossings import WIDTH, scenario
-from tests.world.scenario.test_under_test import headway, state
+from tests.kit.scenario_files import entity, private, scenario_text, speed_action, teleport, write_scenario
+from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
+from tests.world.motion.test_crossings import WIDTH, at_end, change, scenario
+from tests.world.scenario.test_under_test import event, headway, state, stories
 from xosc_lateral.workflows.conversion.event_equivalence import with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.segments import ALPHA, BETA
@@ -117,3 +119,28 @@ def test_esmini_plays_it_as_the_source(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     made = xl.convert(path, tmp_path / "out.xosc", seed=2, player_library=REAL)
     assert "RoutingAction" in (tmp_path / "out.xosc").read_text() and not made.warnings
+
+
+def test_only_the_vehicle_whose_way_moves_an_event_keeps_the_written_one(tmp_path: Path) -> None:
+    waits = (  # B brakes when A is nearly in its lane, where the bell comes at another time
+        "<ByEntityCondition><TriggeringEntities "
+        'triggeringEntitiesRule="any"><EntityRef entityRef="B"/></TriggeringEntities><EntityCondition>'
+        '<RelativeDistanceCondition entityRef="A" relativeDistanceType="lateral" value="0.4" freespace="false" '
+        'rule="lessThan"/></EntityCondition></ByEntityCondition>'
+    )
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A") + entity("B") + entity("C"),
+        init="".join(private(name, teleport(s, lane), speed_action(v))
+                     for name, s, lane, v in (("Ego", "20", "-1", "30"), ("A", "60", "-1", "28"),
+                                              ("B", "90", "-2", "28"), ("C", "160", "-1", "28"))),
+        stories=stories(
+            ("A", event("change", TRIGGER, change("sinusoidal", "5"))),
+            ("B", event("brake", waits, speed_action("20"))),
+            ("C", event("aside", TRIGGER, change("sinusoidal", "5"))),
+        ),
+        stop=at_end(),
+    )  # fmt: skip
+    path = write_scenario(tmp_path, text)
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
+    assert [line for line in made.notes if "lane change of 'C'" in line and "its driver's" in line]
+    assert [line for line in made.notes if "lane changes of 'A'" in line and "would happen otherwise" in line]

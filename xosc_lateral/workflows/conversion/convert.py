@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from math import inf
 from pathlib import Path
 from typing import Unpack
@@ -206,12 +207,15 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, written: Written) -> tu
     """Vehicle by vehicle lane changes as drivers take them, as far as that leaves what happens as it was."""
     look, ways = _looked_at(plan, written), dict[str, Way]()
     while different := changes_of(look[1]):
-        open_ways = {one.entity for one in written.paths if one.instead}
-        blamed = {one.entity for one in different} & open_ways or open_ways
-        for lower in (Way.ASIDE, Way.WRITTEN):
-            tried = ways | {name: lower for name in blamed if name is not None and ways.get(name, Way.ACROSS) > lower}
-            trial = written if tried == ways else write(plan, sampled, tried)
-            outcome = look if tried == ways else _looked_at(plan, trial)
+        theirs = sorted({one.entity for one in written.paths if one.instead})
+        blamed = [name for name in theirs if any(one.entity == name for one in different)]
+        others = [[name] for name in theirs if name not in blamed]
+        for names, lower in product([blamed, *others, theirs], (Way.ASIDE, Way.WRITTEN)):
+            tried = ways | {name: lower for name in names if ways.get(name, Way.ACROSS) > lower}
+            if tried == ways:
+                continue
+            trial = write(plan, sampled, tried)
+            outcome = _looked_at(plan, trial, len(different))
             if len(changes_of(outcome[1])) < len(different):
                 written, look, ways = trial, outcome, tried
                 break
