@@ -21,6 +21,7 @@ from sklearn.metrics import roc_auc_score
 from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
 import xosc_lateral as xl
+from xosc_lateral.extras.detect.tracks import in_lanes
 from xosc_lateral.extras.recordings.maneuvers import changes_of
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
@@ -61,6 +62,7 @@ def played(sets: int, lane_changes: str) -> Iterator[FloatArray]:
                        allow=[folder])  # fmt: skip
             run = play_scenario(output, parameters=settings.parameters, allowed=[Path(folder)])
             car = next(one for one in run.motion.entities if one.name == "CutIn")
+            car = in_lanes(car, RoadLanes(run.network))
             found = window(car, int(np.argmax(np.diff(car.lane) != 0)) + 1)
             if found is not None:
                 yield found
