@@ -12,6 +12,7 @@ from lxml import etree
 from msgspec.structs import replace
 
 import xosc_lateral as xl
+from examples.driver_simulator import simulate_drive
 from tests.extras.recordings.test_importers_tracks import WIDTH, two_lanes_each_way, world
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
@@ -250,3 +251,11 @@ def test_in_reactive_outputs_they_do_where_the_begin_is_known(profile: Path, tmp
     assert difference[difference.index < change.start].max() > 0.6 * DRIFT
     assert difference[difference.index > change.start + 6.0].abs().max() < 0.02
     assert (played(own, "reacts", "Ego") == played(without, "still", "Ego")).all()  # it begins by a distance to Ego
+
+
+def test_fit_holds_the_law_of_a_recording(recording: tuple[Path, Path], found: Maneuvers) -> None:
+    drives = simulate_drive(400.0, seed=5).table
+    path, road = recording
+    fitted = xl.fit(drives, maneuvers=path, road=road)
+    assert fitted.maneuvers == found and path.name in fitted.provenance.inputs
+    assert xl.fit(drives, maneuvers=found).maneuvers == found

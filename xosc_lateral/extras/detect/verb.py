@@ -22,7 +22,7 @@ app = group_of_verbs()
     "detect scenarios/ drives.parquet -o table.csv --report detectors.html",
     "detect recording.csv --road road.xodr --detector logistic --train scenarios/ --sensor usual",
     'detect cut-in.xosc --ego Ego --detector "python mine.py"',
-    "detect cut-in.xosc --like motorway --count 200 -o cut-ins.csv --report cut-ins.html",
+    "detect cut-in.xosc --like motorway --count 2 -o cut-ins.csv --report cut-ins.html",
 )
 def detect(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...",
