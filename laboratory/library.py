@@ -44,6 +44,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenan
 from xosc_lateral.drivers.model.sensor import SensorModel
 from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.extras.recordings.importers.openacc import import_openacc
+from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
 
@@ -105,7 +106,7 @@ def build_library(source: Path, gnss: Sequence[Path], *, model: str = "best") ->
     seen = Seen(runs, *driver_runs(runs, drives), fast)
     inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
     known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
-    population = _population_profile(seen, known, model)
+    population = replace(_population_profile(seen, known, model), maneuvers=read_maneuvers(source))
     profiles = [replace(population, beside=ANSWERS), _single_profile(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
 

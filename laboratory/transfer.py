@@ -45,10 +45,11 @@ from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
 from xosc_lateral.extras.detect.tracks import STEP, Scene
 from xosc_lateral.extras.detect.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
-from xosc_lateral.extras.recordings.maneuvers import maneuvers_of
+from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
+from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 FloatArray = NDArray[np.float64]
 
@@ -148,7 +149,8 @@ def profile_of(wheel: Path, half: int) -> xl.DriverProfile:
     traffic = read_recording(wheel)
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
     drivers = [one for one in vehicles if in_half(one.name, half)]
-    return replace(fitted, maneuvers=maneuvers_of(drivers, vehicles, traffic.network, traffic.name))
+    found = changes_of(drivers, vehicles, RoadLanes(traffic.network))
+    return replace(fitted, maneuvers=law_of(found, traffic.name))
 
 
 @cache

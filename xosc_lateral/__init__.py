@@ -68,6 +68,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "check",
     "read_drives",
     "import_drives",
+    "read_maneuvers",
     "read_profile",
     "write_profile",
     "list_profiles",
@@ -137,6 +138,7 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.live.traffic import Moment, Traffic
     from xosc_lateral.extras.loop.call import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.extras.recordings.importers import ImportedDrives, import_drives
+    from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
     from xosc_lateral.extras.recordings.reconstruct import reconstruct
     from xosc_lateral.extras.recordings.reconstruction import Reconstruction
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many

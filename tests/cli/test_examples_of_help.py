@@ -154,22 +154,9 @@ def _batch(path: Path) -> None:
     run("convert", "scenarios/", "-o", str(path), "--time-limit", "8")
 
 
-def _with_changes(path: Path) -> None:
-    """A profile that holds lane changes, too."""
-    from tests.extras.recordings.test_importers_tracks import two_lanes_each_way
-    from tests.extras.recordings.test_maneuvers import DURATIONS, changing
-
-    rows = [changing(k, one, left=k % 4 > 0, ahead=90.0) for k, one in enumerate(DURATIONS)]
-    pd.concat(rows).to_csv("changes.csv", index=False)
-    drives(Path("fitted.parquet"), 5)
-    road = str(two_lanes_each_way(Path()))
-    run("fit", "fitted.parquet", "-o", path.name, "--maneuvers", "changes.csv", "--road", road)
-
-
 def _varied(path: Path) -> None:
-    _with_changes(Path("mine.json"))
     _scenario(Path("cut-in.xosc"))
-    run("vary", "cut-in.xosc", "--like", "mine.json", "-n", "2", "-o", "varied/")
+    run("vary", "cut-in.xosc", "--like", "motorway", "-n", "2", "-o", "varied/")
 
 
 def _sumo_run(path: Path) -> None:
@@ -198,7 +185,7 @@ MADE: dict[str, Callable[[Path], object]] = {
     "team/": _library, "run.sumocfg": _sumo_run, "recording.csv": _tracks, "python mine.py": _detector,
     "smoothed.csv": _smoothed, "out/": _batch,
     "ours.toml": lambda path: path.write_text('[[claim]]\nid = "ours"\nabout = "folder"\nwords = "Ours."\n'),
-    "varied/cut-in-like-mine.xosc": _varied,
+    "varied/cut-in-like-motorway.xosc": _varied,
     **dict.fromkeys(["ASta_040719_platoon3.csv", "ASta_050719_platoon1.csv"], _openacc),
     "motorway.xodr": lambda path: road_file(Case(), path.parent).rename(path),
 }  # fmt: skip
@@ -227,7 +214,7 @@ def test_an_example_of_a_help_runs(line: str, tmp_path: Path, monkeypatch: pytes
     ]
     for word in read:
         if word in MADE and not (tmp_path / word).exists() and words[:2] != ["profiles", "add"]:
-            (_with_changes if words[0] == "vary" and word == "mine.json" else MADE[word])(tmp_path / word)
+            MADE[word](tmp_path / word)
     if words[:2] == ["profiles", "add"]:
         _fitted(tmp_path / "mine.json")
     if PLAYER in line:

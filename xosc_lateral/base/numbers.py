@@ -7,6 +7,9 @@ from collections.abc import Iterable
 NORMAL_95 = 1.96
 """Standard errors to either side that a 95 % interval has. [-]"""
 
+NORMAL_90 = 1.645
+"""Standard deviations to either side of the mean that hold 90 %: from the 5 % to the 95 % quantile. [-]"""
+
 MAD_TO_SD = 1.4826
 """Standard deviation over median absolute deviation: one over the 75 % quantile. [-]"""
 

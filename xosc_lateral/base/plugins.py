@@ -10,6 +10,8 @@ from pathlib import Path
 from pkgutil import iter_modules
 from typing import Any, TypeVar
 
+from xosc_lateral.base.errors import XoscLateralError
+
 EXTRAS = "xosc_lateral.extras"
 """Where our own extras are, and the entry point group of those of other packages."""
 
@@ -63,8 +65,11 @@ def offered(table: str) -> dict[str, Any]:
 
 
 def service(name: str) -> Any:
-    """What a verb of the core has an extra do, loaded."""
-    return getattr(import_module(offered("SERVICES")[name]), name)
+    """What a verb of the core has an extra do, loaded; `XoscLateralError`: it is not here."""
+    home = (offered("CALLS") | offered("SERVICES")).get(name)
+    if home is None:
+        raise XoscLateralError(f"what this takes ({name}) is done by an extra that is not installed here")
+    return getattr(import_module(home), name)
 
 
 T = TypeVar("T")

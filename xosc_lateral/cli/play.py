@@ -179,7 +179,7 @@ def write(
 
 @command(
     app, "vary", VERBS["vary"],
-    "vary cut-in.xosc --like mine.json -n 200 -o varied/", "convert varied/cut-in-like-mine.xosc -o out/",
+    "vary cut-in.xosc --like motorway -n 200 -o varied/", "convert varied/cut-in-like-motorway.xosc -o out/",
 )
 def vary(
     scenario: Scenario, *,
@@ -189,8 +189,8 @@ def vary(
 ) -> None:
     """Write variations of a scenario in which lane changes last as long as those of a profile's drivers.
 
-    Drawn are durations, from lane changes to that side at about its speed, in such a lane, as far behind the vehicle
-    ahead; with --speeds, changes of speed. Who changes lanes, when and where to stays the scenario's: neither gaps nor
-    rates are drawn, nor lane changes that are given up.
+    Drawn are durations (rates, where those are stated), for the gap to the vehicle ahead; with --speeds, changes of
+    speed. Who changes lanes, when and where to stays the scenario's: neither gaps nor how often are drawn, nor lane
+    changes that are given up. What is shorter than real drivers take is varied about itself.
     """
     reply.say(xl.vary(scenario, output, **options, force=reply.force))

@@ -1,7 +1,8 @@
-"""Maneuver profiles: lane changes of a recording as a smoothed sample, and scenarios varied by them."""
+"""Maneuver laws: lane changes of a recording as figures, and scenarios varied by them."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ from lxml import etree
 from msgspec.structs import replace
 
 import xosc_lateral as xl
+from examples.driver_simulator import simulate_drive
 from tests.extras.recordings.test_importers_tracks import WIDTH, two_lanes_each_way, world
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.model.maneuvers import COLUMNS, Maneuvers, fit_maneuvers
+from xosc_lateral.drivers.model.maneuvers import Maneuvers
 from xosc_lateral.extras.recordings.maneuvers import BEFORE, read_maneuvers
 from xosc_lateral.files.openscenario.distribution import read_distribution
 
@@ -38,12 +41,14 @@ def changing(number: int, duration: float, *, left: bool, ahead: float) -> pd.Da
 
 
 DURATIONS = np.linspace(5.0, 9.0, 24)
+AHEAD = 60.0 + 4.0 * (7 * np.arange(24) % 24)
+"""Of the leader, which loses 2 m/s for 20 s until the begin. [m]"""
 
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("changes")
-    rows = [changing(k, one, left=k % 4 > 0, ahead=90.0) for k, one in enumerate(DURATIONS)]
+    rows = [changing(k, one, left=k % 4 > 0, ahead=float(AHEAD[k])) for k, one in enumerate(DURATIONS)]
     pd.concat(rows).to_csv(folder / "tracks.csv", index=False)
     return folder / "tracks.csv", two_lanes_each_way(folder)
 
@@ -54,16 +59,16 @@ def found(recording: tuple[Path, Path]) -> Maneuvers:
 
 
 def test_lane_changes_of_a_recording_are_those_that_were_driven(found: Maneuvers) -> None:
-    assert (found.changes, found.aborted) == (24, 0)
-    duration, speed = found.column("duration"), found.column("speed")
-    assert abs(np.median(duration) - np.median(DURATIONS)) < 0.6
-    assert 0.7 < np.std(np.log(duration)) / np.std(np.log(DURATIONS)) < 1.4
-    assert abs(np.median(speed) - 30.0) < 0.3
-    assert abs(np.median(found.column("gap")) - 50.0) < 3.0  # 90 m less 2 m/s for 20 s
-    assert abs(np.median(found.column("closing_speed")) - 2.0) < 0.3
-    assert abs(np.mean(found.left) - 0.75) < 0.1
+    assert found.changes == 24 and found.behind.value == 1.0 and found.given_up.value == 0.0
+    assert abs(found.gap.value / np.exp(np.log(AHEAD - 40.0).mean()) - 1.0) < 0.05
+    assert abs(found.duration(0.0, 50.0) - np.median(DURATIONS)) < 0.6
+    assert found.gap_exponent.low < 0.0 < found.gap_exponent.high
+    assert found.spread_behind.low < np.std(np.log(DURATIONS)) < found.spread_behind.high
+    assert found.left.low < 0.75 < found.left.high
     keeping = (48.0 * 40.0 - DURATIONS.sum()) / 3600.0
-    assert abs(found.hours / keeping - 1.0) < 0.05
+    assert abs(found.hours / keeping - 1.0) < 0.05 and abs(found.rate.value * found.hours - 24.0) < 0.1
+    for side in ("left", "right"):
+        assert abs(found.end[side].mean.value) < 0.1 and abs(found.speed_change[side].mean.value) < 0.1
 
 
 def test_the_way_before_is_that_of_the_drivers_by_side(found: Maneuvers) -> None:
@@ -71,38 +76,6 @@ def test_the_way_before_is_that_of_the_drivers_by_side(found: Maneuvers) -> None
     for side, sign in (("left", -1.0), ("right", 1.0)):
         away = np.array(found.before[side]) - sign * planted
         assert np.abs(away[BEFORE < -1.0]).max() < 0.08, side  # where a change begins is known to half a second
-
-
-def test_a_smoothed_sample_has_means_spreads_and_correlations_and_no_row_of_the_data() -> None:
-    rng = np.random.default_rng(3)
-    n = 400
-    speed = rng.normal(30.0, 4.0, n)
-    measured = {name: rng.normal(5.0, 1.0, n) for name in COLUMNS} | {"speed": speed}
-    measured |= {"duration": np.exp(0.02 * (speed - 30.0) + rng.normal(2.0, 0.1, n)), "gap": np.full(n, np.nan)}
-    made = fit_maneuvers(
-        measured, rng.random(n) < 0.6, before={"left": np.zeros((3, 41))}, hours=1.0, aborted=1, recording="r"
-    )
-    for name in ("speed", "duration", "lane_width"):
-        column, error = made.column(name), measured[name].std() / np.sqrt(200)
-        assert abs(column.mean() - measured[name].mean()) < 4.0 * error
-        assert 0.85 < column.std() / measured[name].std() < 1.15
-        assert not np.isin(column, np.round(measured[name], 6)).any()
-    real, sampled = (np.corrcoef(one["speed"], np.log(one["duration"]))[0, 1]
-                     for one in (measured, {name: made.column(name) for name in COLUMNS}))  # fmt: skip
-    assert abs(sampled - real) < 0.2
-    assert np.isnan(made.column("gap")).all()
-    assert Maneuvers(**{name: getattr(made, name) for name in made.__struct_fields__}) == made
-
-
-def test_rows_like_the_scenarios_weigh_most(found: Maneuvers) -> None:
-    weights = found.weights(left=True, speed=30.0, lane_width=3.5)
-    assert np.isclose(weights.sum(), 1.0)
-    assert not weights[~np.array(found.left)].any()
-    near, none = (found.weights(left=True, speed=30.0, lane_width=3.5, gap=gap) for gap in (30.0, np.nan))
-    assert (near * found.column("gap")).sum() < (weights * found.column("gap")).sum()
-    assert np.allclose(none, weights)  # all of these have somebody ahead
-    far = found.weights(left=True, speed=300.0, lane_width=3.5)  # nobody drove so fast: the fastest stand for him
-    assert found.column("speed")[far.argmax()] == found.column("speed")[np.array(found.left)].max()
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +87,7 @@ def profile(found: Maneuvers, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_profile_keeps_its_maneuvers_and_one_without_is_as_it_was(profile: Path, found: Maneuvers, capsys) -> None:
     assert xl.read_profile(profile).maneuvers == found
-    assert "maneuvers" not in xl.read_profile("motorway").to_dict()
+    assert "maneuvers" not in xl.read_profile("rural").to_dict()
     assert main(["profiles", "show", str(profile)]) == 0
     assert "24 lane changes" in capsys.readouterr().out
 
@@ -123,16 +96,14 @@ def test_a_scenario_is_varied_in_the_parameters_that_it_has(profile: Path, tmp_p
     scenario, _ = xl.write_template("cut-in", tmp_path / "first")
     made = xl.vary(scenario, tmp_path / "varied", like=profile, count=4, seed=3)
     assert list(made.durations) == ["lane_change_time"]
-    assert set(made.durations["lane_change_time"]) <= set(
-        np.round(xl.read_profile(profile).maneuvers.column("duration"), 3)
-    )
     schema = etree.XMLSchema(etree.parse(str(XSD)))
     for path in (made.scenario, made.distribution):
         schema.assertValid(etree.parse(str(path)))
     again = xl.vary(scenario, tmp_path / "again", like=profile, count=4, seed=3)
     assert again.distribution.read_bytes() == made.distribution.read_bytes()
     (part,) = read_distribution(made.distribution).distribution.parts  # what `convert` makes variants of
-    assert [float(one["lane_change_time"]) for one in part.sets] == made.durations["lane_change_time"]
+    drawn = [float(one["lane_change_time"]) for one in part.sets]
+    assert drawn == np.round(made.durations["lane_change_time"], 3).tolist()
 
 
 def test_a_lane_change_without_a_parameter_gets_one(profile: Path, tmp_path: Path) -> None:
@@ -148,6 +119,58 @@ def test_a_lane_change_without_a_parameter_gets_one(profile: Path, tmp_path: Pat
     assert abs(lasts[0] - lasts[1] - (values[0] - 4.0)) < 0.3
     unchanged = xl.play(made.scenario).to_frame()
     pd.testing.assert_frame_equal(unchanged, plain.to_frame())  # the default is what was written
+
+
+def test_no_lane_change_gets_milder_unless_that_is_asked_for(tmp_path: Path) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path / "first", lane_change_time="2")
+    made = xl.vary(scenario, tmp_path / "varied", like="motorway", count=200, seed=1)
+    (change,) = made.changes
+    assert change.about_itself and change.written == 2.0 < change.law[0]
+    spread = xl.read_profile("motorway").maneuvers.spread_alone.value
+    assert abs(np.median(change.durations) / 2.0 - 1.0) < 4.0 * spread / np.sqrt(200)
+    assert abs(np.std(np.log(change.durations)) / spread - 1.0) < 0.2
+    assert "varied about itself" in str(made) and "as written" in str(made)
+    (theirs,) = xl.vary(scenario, tmp_path / "theirs", like="motorway", count=200, seed=1, replace=True).changes
+    assert not theirs.about_itself
+    np.testing.assert_allclose(np.quantile(theirs.durations, [0.05, 0.5, 0.95]), theirs.law, rtol=0.1)
+
+
+def test_a_rate_is_varied_as_a_rate(tmp_path: Path) -> None:
+    scenario, _ = xl.write_template("cut-in", tmp_path / "first")
+    text = scenario.read_text()
+    dynamics = 'value="$lane_change_time" dynamicsDimension="time"'
+    assert dynamics in text
+    scenario.write_text(text.replace(dynamics, 'value="0.7" dynamicsDimension="rate"'))
+    made = xl.vary(scenario, tmp_path / "varied", like="motorway", count=3, seed=1)
+    (change,) = made.changes
+    assert change.is_rate and change.parameter.endswith("_rate")
+    for rate, duration in zip(change.values, change.durations, strict=True):
+        rows = xl.play(made.scenario, parameters={change.parameter: rate})._played.motion
+        (action,) = (one for one in rows.actions if "CutInEvent" in one.path)
+        assert action.end - action.start == pytest.approx(duration, abs=0.05)
+
+
+def test_a_profile_with_rows_of_an_older_version_is_read_as_their_law(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    led, n = rng.random(200) < 0.5, 200
+    gap = np.where(led, np.exp(rng.normal(4.0, 0.8, n)), np.nan)
+    duration = np.exp(np.where(led, 1.5 + 0.15 * np.log(np.where(led, gap, 1.0)), 2.1) + rng.normal(0.0, 0.2, n))
+    columns = {"duration": duration, "gap": gap, "speed": np.full(n, 30.0), "speed_change": rng.normal(1.0, 2.0, n)}
+    values = xl.read_profile("motorway").to_dict() | {"maneuvers": {
+        "changes": 500, "hours": 10.0, "aborted": 25, "left": (rng.random(n) < 0.5).tolist(), "recording": "old",
+        "sample": {name: [None if np.isnan(one) else one for one in rows.tolist()] for name, rows in columns.items()},
+        "before": {"left": [0.0, 0.1]},
+    }}  # fmt: skip
+    path = tmp_path / "motorway.json"
+    path.write_text(json.dumps(values))
+    law = xl.read_profile(path).maneuvers
+    assert law is not None and law.changes == 500 and law.rate.value == 50.0
+    assert law.gap_exponent.low < 0.15 < law.gap_exponent.high
+    assert abs(law.duration(0.0, 30.0) / np.exp(1.5 + 0.15 * np.log(30.0)) - 1.0) < 0.06
+    assert law.given_up.value == pytest.approx(25 / 525, abs=1e-4) and law.before == {"left": (0.0, 0.1)}
+    path.write_text(json.dumps(values | {"maneuvers": {"sample": {}, "changes": 1}}))
+    with pytest.raises(FormatError, match=r"motorway\.json: maneuvers: no smoothed sample"):
+        xl.read_profile(path)
 
 
 def test_speeds_change_beside_lane_changes_where_the_vehicle_keeps_its_own(profile: Path, tmp_path: Path) -> None:
@@ -174,16 +197,14 @@ def test_a_vehicle_ahead_is_found_in_lanes_that_run_against_the_road(tmp_path: P
     turned["x"], turned["y"], turned["psi"] = 2 * x[0] - turned["x"], 2 * y[0] - turned["y"], turned["psi"] + np.pi
     turned.to_csv(tmp_path / "tracks.csv", index=False)
     found = read_maneuvers(tmp_path / "tracks.csv", road)
-    assert found.changes == len(DURATIONS)
-    assert abs(np.nanmedian(found.column("gap")) - 50.0) < 3.0 and not np.isnan(found.column("gap")).any()
-    assert abs(np.median(found.column("closing_speed")) - 2.0) < 0.3
+    assert found.changes == len(DURATIONS) and found.behind.value == 1.0
 
 
 def test_what_cannot_be_varied_is_refused_in_a_line(profile: Path, tmp_path: Path, capsys) -> None:
     scenario, _ = xl.write_template("jam-end", tmp_path)
     assert main(["vary", str(scenario), "--like", str(profile), "-o", str(tmp_path / "a")]) == 1
     assert "no lane change with a duration" in capsys.readouterr().err
-    assert main(["vary", str(scenario), "--like", "motorway", "-o", str(tmp_path / "a")]) == 1
+    assert main(["vary", str(scenario), "--like", "rural", "-o", str(tmp_path / "a")]) == 1
     assert "holds no maneuvers" in capsys.readouterr().err
     assert not (tmp_path / "a").exists()
 
@@ -230,3 +251,11 @@ def test_in_reactive_outputs_they_do_where_the_begin_is_known(profile: Path, tmp
     assert difference[difference.index < change.start].max() > 0.6 * DRIFT
     assert difference[difference.index > change.start + 6.0].abs().max() < 0.02
     assert (played(own, "reacts", "Ego") == played(without, "still", "Ego")).all()  # it begins by a distance to Ego
+
+
+def test_fit_holds_the_law_of_a_recording(recording: tuple[Path, Path], found: Maneuvers) -> None:
+    drives = simulate_drive(400.0, seed=5).table
+    path, road = recording
+    fitted = xl.fit(drives, maneuvers=path, road=road)
+    assert fitted.maneuvers == found and path.name in fitted.provenance.inputs
+    assert xl.fit(drives, maneuvers=found).maneuvers == found

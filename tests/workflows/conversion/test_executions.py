@@ -23,7 +23,7 @@ def endless(tmp_path: Path) -> Path:
 
 
 def test_offsets_follow_so_many_runs_of_an_action(endless: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(convert, "check", lambda plan, written: written)  # which would make the moves smaller
+    monkeypatch.setattr(convert, "check", lambda plan, written, first: written)  # which would make the moves smaller
     result = xl.convert(endless, time_limit=24.0)
     acts = result.data.count(b'<Act name="xosc-lateral offsets')
     assert REPEATED_RUNS.value < acts <= REPEATED_RUNS.value + SPARE_ACTS + 2

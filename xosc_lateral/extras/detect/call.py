@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, ScenarioInput, scenario_input, several
 from xosc_lateral.workflows.opened import HeldPath, is_document, opened, opened_as_one
-from xosc_lateral.workflows.options import PathLike, Paths, declare_options, flag
+from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike, declare_options, flag
 from xosc_lateral.workflows.options import paths as as_paths
+from xosc_lateral.workflows.result import given_profile
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.evaluation.spectra import Spectrum
+    from xosc_lateral.extras.detect.cut_ins import CutIns
     from xosc_lateral.extras.detect.detection import Detection
     from xosc_lateral.extras.detect.detectors import Detector
     from xosc_lateral.extras.detect.observation import Sensor, View
@@ -62,6 +64,16 @@ def detect(
         "movement.")] = None,
     threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
     answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
+    like: Annotated[ProfileLike | None, flag(kind=str | None, metavar="PROFILE", show_default=False,
+        help="A table of cut-ins instead: the scenario's lane changes varied as by `vary --like`, a drive for each "
+        "set.")] = None,
+    replace: Annotated[bool, flag("--replace",
+        help="With --like: lane changes that are shorter than real ones get their durations, too.")] = False,
+    count: Annotated[int, flag("--count", min=1, max=100_000, help="With --like: sets.")] = 100,
+    shard: Annotated[str | None, flag("--shard", metavar="K/N", show_default=False,
+        help="With --like: the K-th of N parts of the sets.")] = None,
+    keep: Annotated[PathLike | None, flag("--keep", kind=Path | None, metavar="FOLDER", show_default=False,
+        help="With --like: where the variations and what they are converted to stay.")] = None,
     sight: Annotated[bool, flag(
         help="Range of vision instead: how often a vehicle sees the car before the car ahead.")] = False,
     seed: int = 0,
@@ -72,7 +84,7 @@ def detect(
     allow: Paths = (),
     road_path: Paths = (),
     time_limit: float | None = None,
-) -> Detection | Sight:  # fmt: skip
+) -> Detection | Sight | CutIns:  # fmt: skip
     """Count what cut-in detectors do on scenarios, drive tables and recordings, side by side.
 
     Parameters
@@ -139,6 +151,24 @@ def detect(
     settings = SourceSettings(convert, variants, names, ego, columns=as_mapping(columns))
     if isinstance(road, str | os.PathLike):
         settings = settings.on(Path(road))
+    if like is not None:
+        from xosc_lateral.extras.detect.cut_ins import cut_ins_like
+        from xosc_lateral.workflows.batch.call import read_shard
+
+        if len(paths) != 1 or inputs[0].held is not None:
+            raise ValueError("--like varies one scenario, in a file")
+        found = [
+            each
+            for word in requested
+            for each in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=False)
+            if isinstance(each, Detector)
+        ]
+        part = (1, 1) if shard is None else read_shard(shard)
+        where = None if keep is None else Path(keep)
+        law = given_profile(like, library)
+        return cut_ins_like(
+            paths[0], law, found, settings, seen_with, count=count, replaces=replace, part=part, keep=where
+        )
     looked_at = [source for one in inputs for source in sources_of(one.path, settings.on(one.road, one.held))]
     bands = () if band_of is None else (Path(band_of),)
     files = [path for path in (*paths, *trainers, *homes, *bands) if path.is_file()]
@@ -187,7 +217,7 @@ def band_source(path: Path, settings: SourceSettings) -> Spectrum:
     from xosc_lateral.extras.detect.band import keeping_spectrum
     from xosc_lateral.extras.detect.sources import checked, sources_of
 
-    (source,) = sources_of(path, replace(settings, variants=0))
+    (source,) = sources_of(path, replaced(settings, variants=0))
     return keeping_spectrum((track for scene in checked(source) for track in scene.tracks), source.label)
 
 
@@ -196,7 +226,7 @@ def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) ->
     from xosc_lateral.extras.detect.band import band_of, keeping_spectrum
 
     home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
-    return replace(sensor, band=band_of(recorded, home))
+    return replaced(sensor, band=band_of(recorded, home))
 
 
 def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
@@ -243,7 +273,7 @@ def _detectors(
         return
     if not trainers:
         raise ValueError(f"{TRAINED_RULE} has to be trained: name a source with --train")
-    as_they_are = replace(settings, variants=0)
+    as_they_are = replaced(settings, variants=0)
     views = _training_views(trainers, as_they_are, sensor, seed)
     yield train(views, detector, ", ".join(path.name for path in trainers))
 

@@ -28,6 +28,7 @@ from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, Request, concrete, document_kind
+from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import carry_out
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
@@ -139,17 +140,22 @@ def _lifelike(
     def scenes() -> Iterator[Scene]:
         for scenario, name, requested, number in named:
             convert = replace(requested, profile=profile, ego=ego)
-            prepared = prepare(scenario, convert)
             for variant in range(settings.variants):
                 index = number * settings.variants + variant  # each set has offsets of its own
-                made = carry_out(decide(prepared, convert, output=scenario, variant_index=index, saves=False))
-                written = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
-                motion = play(written, prepared.played.network, step=STEP, time_limit=convert.time_limit)
+                made, played = converted(scenario, convert, index)
                 ego_name = settings.ego or next(iter(made.provenance.ego), "none")
-                played = Played(written, prepared.played.network, motion)
                 yield played_scene(played, f"{name} #{variant + 1}", ego_name, cluster=name)
 
     return Source(f"{label}, {profile}", scenes, files)
+
+
+def converted(scenario: Path, convert: ConvertSettings, index: int) -> tuple[Conversion, Played]:
+    """The variant of a number, from 0, in memory, and as what is written plays."""
+    prepared = prepare(scenario, convert)
+    made = carry_out(decide(prepared, convert, output=scenario, variant_index=index, saves=False))
+    written = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
+    motion = play(written, prepared.played.network, step=STEP, time_limit=convert.time_limit)
+    return made, Played(written, prepared.played.network, motion)
 
 
 def _play(scenario: Path, convert: ConvertSettings) -> Played:

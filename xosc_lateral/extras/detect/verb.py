@@ -22,13 +22,14 @@ app = group_of_verbs()
     "detect scenarios/ drives.parquet -o table.csv --report detectors.html",
     "detect recording.csv --road road.xodr --detector logistic --train scenarios/ --sensor usual",
     'detect cut-in.xosc --ego Ego --detector "python mine.py"',
+    "detect cut-in.xosc --like motorway --count 2 -o cut-ins.csv --report cut-ins.html",
 )
 def detect(
     sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...",
         help="Scenarios, folders, drive tables, recordings.", show_default=False)],
     *,
     output: Annotated[str | None, typer.Option("--output", "-o", metavar="TABLE",
-        help="Every threshold: .csv, .csv.gz, .parquet.")] = None,
+        help="Every threshold, with --like every cut-in: .csv, .csv.gz, .parquet.")] = None,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Page with curves and worst cases.")] = None,
     options: Annotated[Options, xl.detect],
     reply: Written,

@@ -15,12 +15,12 @@ VERBS = {
     ),
 }
 CALLS = {
+    "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
     "reconstruct": "xosc_lateral.extras.recordings.reconstruct",
     "import_drives": "xosc_lateral.extras.recordings.importers",
     "Reconstruction": "xosc_lateral.extras.recordings.reconstruction",
     "ImportedDrives": "xosc_lateral.extras.recordings.importers",
 }
 SERVICES = {
-    "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
     "drives_of": "xosc_lateral.extras.recordings.recordings",
 }

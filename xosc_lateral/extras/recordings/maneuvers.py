@@ -1,75 +1,96 @@
-"""Lane changes of a recording, as `reconstruct` finds them, for a maneuver profile."""
+"""Lane changes of a recording, as `reconstruct` finds them, for the maneuver law of a profile."""
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
-from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, COLUMNS, Maneuvers, fit_maneuvers
-from xosc_lateral.drivers.model.profile import SIDES
+from xosc_lateral.drivers.fitting.maneuvers import SIDES, MeasuredChanges, fit_maneuvers
+from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, Maneuvers
 from xosc_lateral.extras.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
+from xosc_lateral.workflows.result import PathLike
 from xosc_lateral.world.motion.nominal import EntityMotion
-from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_ahead
+from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
 BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""
 
 
-def read_maneuvers(recording: Path, road: Path | None = None) -> Maneuvers:
-    """Maneuver profile of a recording; raises `FormatError`, `NotEnoughDataError`."""
-    traffic = read_recording(recording, road=road)
+def read_maneuvers(recording: PathLike, road: PathLike | None = None) -> Maneuvers:
+    """Law of a recording's lane changes; raises `FormatError`, `NotEnoughDataError`."""
+    traffic = read_recording(Path(recording), road=None if road is None else Path(road))
     vehicles = place_tracks(traffic.tracks, traffic.network, *traffic.span).vehicles
-    return maneuvers_of(vehicles, vehicles, traffic.network, recording.name)
+    return law_of(changes_of(vehicles, vehicles, RoadLanes(traffic.network)), traffic.name)
 
 
-def maneuvers_of(
-    drivers: Iterable[EntityMotion], vehicles: Sequence[EntityMotion], network: RoadNetwork, recording: str
-) -> Maneuvers:
-    """Maneuver profile of some drivers among vehicles in the lanes of a road; raises `NotEnoughDataError`."""
-    measured, sides, aborted, keeping = defaultdict[str, list[float]](list), list[bool](), 0, 0.0
-    lanes = RoadLanes(network)
-    ways: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
+class VehicleChanges(NamedTuple):
+    """Lane changes of one vehicle, and what it did beside them."""
+
+    motion: EntityMotion
+    changes: list[tuple[float, ...]]  # `MeasuredChanges` of each
+    crossing: list[int]  # row in which each is over the marking
+    ways: list[tuple[str, FloatArray]]  # side, and way before [m]
+    keeping: float  # time in its lane [s]
+    aborted: float  # lane changes that it gave up
+
+
+def changes_of(
+    drivers: Iterable[EntityMotion], vehicles: Sequence[EntityMotion], lanes: RoadLanes
+) -> list[VehicleChanges]:
+    """Lane changes of some drivers among vehicles in the lanes of a road."""
+    found = list[VehicleChanges]()
     for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
         if plan.is_played:
             continue
-        keeping += float(np.ptp(vehicle.time)) - sum(transition.duration for transition in plan.transitions)
-        aborted += sum(transition.aborted and not transition.cut for transition in plan.transitions)
+        keeping = float(np.ptp(vehicle.time)) - sum(transition.duration for transition in plan.transitions)
+        aborted = 0.5 * sum(transition.aborted and not transition.cut for transition in plan.transitions)
+        own = VehicleChanges(vehicle, [], [], [], keeping, aborted)
         free = float(vehicle.time[0])
         for transition in plan.transitions:
             if transition.lanes and not transition.cut:
-                for name, value in zip(COLUMNS, _facts(vehicle, transition, vehicles, lanes), strict=True):
-                    measured[name].append(value)
-                sides.append(transition.lanes > 0)
+                measured, crossing = _measured(vehicle, transition, vehicles, lanes)
+                own.changes.append(measured)
+                own.crossing.append(crossing)
                 way = _way_before(vehicle, transition, free)
                 if way is not None:
-                    ways[SIDES[transition.lanes < 0]].append(way)
+                    own.ways.append((SIDES[transition.lanes < 0], way))
             free = transition.end
-    columns = {name: np.array(measured[name]) for name in COLUMNS}
-    before = {side: np.array(rows) for side, rows in ways.items()}
+        found.append(own)
+    return found
+
+
+def law_of(found: Sequence[VehicleChanges], recording: str) -> Maneuvers:
+    """Their law; raises `NotEnoughDataError`."""
+    rows = [one for vehicle in found for one in vehicle.changes]
+    duration, gap, speed_change, end, left = np.array(rows).reshape(-1, len(MeasuredChanges._fields)).T
+    ways = [one for vehicle in found for one in vehicle.ways]
     return fit_maneuvers(
-        columns, np.array(sides), before=before, hours=max(keeping, 1.0) / 3600.0, aborted=aborted // 2,
-        recording=recording,
+        MeasuredChanges(duration, gap, speed_change, end, left > 0.0),
+        before={side: np.array([way for other, way in ways if other == side]) for side in SIDES},
+        hours=max(sum(vehicle.keeping for vehicle in found), 1.0) / 3600.0,
+        aborted=sum(vehicle.aborted for vehicle in found), recording=recording,
     )  # fmt: skip
 
 
-def _facts(
+def _measured(
     vehicle: EntityMotion, transition: Transition, vehicles: Sequence[EntityMotion], lanes: RoadLanes
-) -> tuple[float, ...]:
-    """`COLUMNS` of a lane change."""
+) -> tuple[tuple[float, ...], int]:
+    """`MeasuredChanges` of one, and the row in which it is in the other lane."""
     ends = np.searchsorted(vehicle.time, (transition.start, transition.end))
     first, last = np.minimum(ends, len(vehicle.time) - 1).tolist()
-    speed, width = float(vehicle.speed[first]), float(vehicle.lane_width[first])
-    ahead = vehicle_ahead(vehicle, first, vehicles, lanes)
-    return transition.duration, speed, float(vehicle.speed[last]) - speed, width, vehicle.box.length, *ahead
+    aside, base, number = own_lateral(vehicle)
+    speed_change = float(vehicle.speed[last] - vehicle.speed[first])
+    gap = vehicle_next(vehicle, first, vehicles, lanes).gap
+    measured = transition.duration, gap, speed_change, float(aside[last] - base[last]), float(transition.lanes > 0)
+    return measured, first + int(np.argmax(number[first : last + 1] == number[last]))
 
 
 def _way_before(vehicle: EntityMotion, transition: Transition, free: float) -> FloatArray | None:

@@ -186,11 +186,12 @@ def _common_folder(requests: Sequence[Request]) -> Path:
 def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
-    for source, suffix, settings, error in concrete(request, kind):
+    for number, (source, suffix, settings, error) in enumerate(concrete(request, kind)):
         named = relative.with_name(f"{stem}{suffix}{relative.suffix}")
         scenario = printable(Path(os.path.relpath(source, base)).as_posix())
         for variant in range(request.variants):
             output = numbered(named, variant, request.variants)
+            index = number * request.variants + variant  # each set of parameters has drives of its own
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
@@ -201,8 +202,8 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
                 output=root / output,
                 base=base,
                 settings=settings,
-                variant=variant,
-                fingerprint=fingerprints.of(settings, variant),
+                variant=index,
+                fingerprint=fingerprints.of(settings, index),
                 error=error,
             )
 

@@ -2,11 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from enum import IntEnum
+
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.enums import Priority
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction, RelativeTargetLane
 from xosc_lateral.world.scenario.scenario import Scenario, StoryEvent
 
 Path = tuple[str, ...]
+
+
+class Way(IntEnum):
+    """How lane changes of a vehicle that reacts lead across, as far as they can; what is less leaves more as it was."""
+
+    WRITTEN = 0
+    ASIDE = 1  # as written, to where its driver is then
+    ACROSS = 2  # as its driver takes it
+
+
+WAY_WORDS = {
+    Way.WRITTEN: "stay as written",
+    Way.ASIDE: "keep their written way, and end where its driver is then",
+}
+"""Of those whose way could not be their driver's."""
+
+
+def in_words(paths: Sequence[OffsetPath], motion: NominalMotion) -> Iterator[str]:
+    """A line for each lane change that a path leads across."""
+    for path in paths:
+        if path.instead and path.settles is None:
+            begin = min(one.start for one in motion.actions if (one.path, one.actor) == (path.after, path.entity))
+            side = "left" if path.end > 0.0 else "right"
+            yield (
+                f"lane change of '{path.entity}' at {begin:.1f} s is its driver's: it ends when the written one does, "
+                f"{abs(path.end):.2f} m {side} of the middle"
+            )
 
 
 def lane_changes_of(scenario: Scenario, actor: str) -> dict[Path, tuple[StoryEvent, LaneChangeAction]]:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
+from math import inf
 from pathlib import Path
 from typing import Unpack
 
 from msgspec import structs
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
-from xosc_lateral.base.note import warnings
+from xosc_lateral.base.note import notes, warnings
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
@@ -23,10 +25,11 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.remote import leads_from, sent_back
 from xosc_lateral.files.source import guard_input, guarding_inputs
+from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way, in_words
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import changes_of, shrink_until_equivalent
 from xosc_lateral.workflows.conversion.event_equivalence import as_played
 from xosc_lateral.workflows.conversion.plan import Plan, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
@@ -137,15 +140,12 @@ def convert_scenario(
 
 def carry_out(plan: Plan) -> Conversion:
     """Sample, write, check."""
-    sampled, lifelike = sample(plan), plan.settings.lane_changes is LaneChanges.LIFELIKE
-    checked = check(plan, write(plan, sampled, lifelike=lifelike))
-    across = {path.entity for path in checked.paths if path.instead}
-    if across and checked.otherwise:
-        plain = check(plan, write(plan, sampled, lifelike=True, leads=False))
-        why = "with the way that drivers take, what happens would happen otherwise"
-        if plain.otherwise < checked.otherwise:
-            lines = (f"lane changes of '{name}' stay as written: {why}" for name in sorted(across))
-            checked = replace(plain, stays=(*checked.stays, *lines))
+    sampled = sample(plan)
+    written = write(plan, sampled)
+    if plan.is_replay:
+        checked = _look_at_replay(written)
+    else:
+        checked = check(plan, *_as_far_as_equivalent(plan, sampled, written))
     if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
         write_atomically(plan.output, checked.file.data)
     return _conversion(plan, checked)
@@ -170,6 +170,7 @@ def sample(plan: Plan) -> Enriched:
             plan.extended,  # played on beyond the end where the output is reactive, and the same up to there
             ego_dependent=plan.depends.entities,
             continuous=plan.continuous,
+            unforeseen=frozenset(plan.depends.begins),
             neighbours=settings.neighbours,
             respects_controllers=respects_controllers(settings),
         )
@@ -189,34 +190,66 @@ def sample(plan: Plan) -> Enriched:
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
-def check(plan: Plan, written: Written) -> Written:
-    """Play a reactive output in `EventEquivalence`'s ways of driving, and make moves smaller where they change events.
+Look = tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]
+"""An output, read and its nominal run, and what differs from its source."""
 
-    A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made.
-    """
-    if plan.is_replay:
-        made = (one for one in written.movement.entities if one.is_enriched)
-        found = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
-        return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in found for one in some))
-    settings, source = plan.settings, plan.played.scenario
-    equivalence = plan.prepared.equivalence(tuple(plan.egos))
+
+def _look_at_replay(written: Written) -> Written:
+    """A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made."""
+    made = (one for one in written.movement.entities if one.is_enriched)
+    found = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
+    return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in found for one in some))
+
+
+def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
+    """Play a reactive output in `EventEquivalence`'s ways of driving, until `most` happens otherwise."""
+    source = plan.played.scenario
     read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
-    allowed = (*settings.allow, *(path.parent for path in read_files))
+    allowed = (*plan.settings.allow, *(path.parent for path in read_files))
+    # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
+    place = leads_from(plan.source, plan.output)
+    output = read_scenario(place, allowed=allowed, roads=plan.settings.roads, data=written.file.data)
+    comparisons, run = plan.prepared.equivalence(tuple(plan.egos)).compare(
+        output, written.vehicles.trajectories, written.with_lane_offsets, most=most
+    )
+    return (written, output, run), comparisons
 
-    def attempt(
-        paths: Sequence[OffsetPath], most: float
-    ) -> tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]:
-        trial = written
-        if paths is not written.paths:  # those of the first trial are written already
-            trial = write_with(paths, plan, written.movement, written.vehicles, written.provenance)
-        # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
-        place = leads_from(plan.source, plan.output)
-        output = read_scenario(place, allowed=allowed, roads=settings.roads, data=trial.file.data)
-        comparisons, run = equivalence.compare(
-            output, written.vehicles.trajectories, {path.entity for path in paths}, most=most
-        )
-        return (trial, output, run), comparisons
 
+def _as_far_as_equivalent(plan: Plan, sampled: Enriched, written: Written) -> tuple[Written, Look]:
+    """Vehicle by vehicle lane changes as drivers take them, as far as that leaves what happens as it was."""
+    look, ways = _looked_at(plan, written), dict[str, Way]()
+    while different := changes_of(look[1]):
+        theirs = sorted({one.entity for one in written.paths if one.instead})
+        blamed = [name for name in theirs if any(one.entity == name for one in different)]
+        others = [[name] for name in theirs if name not in blamed]
+        for names, lower in product([blamed, *others, theirs], (Way.ASIDE, Way.WRITTEN)):
+            tried = ways | {name: lower for name in names if ways.get(name, Way.ACROSS) > lower}
+            if tried == ways:
+                continue
+            trial = write(plan, sampled, tried)
+            outcome = _looked_at(plan, trial, len(different))
+            if len(changes_of(outcome[1])) < len(different):
+                written, look, ways = trial, outcome, tried
+                break
+        else:
+            break
+    why = "with the way that drivers take, what happens would happen otherwise"
+    lines = (f"lane changes of '{name}' {WAY_WORDS[way]}: {why}" for name, way in sorted(ways.items()))
+    said = in_words(written.paths, plan.played.motion)
+    return replace(written, stays=(*said, *written.stays, *lines)), look
+
+
+def check(plan: Plan, written: Written, first: Look) -> Written:
+    """Make moves of a reactive output smaller where they change events, given a look at it."""
+    settings = plan.settings
+    equivalence = plan.prepared.equivalence(tuple(plan.egos))
+
+    def attempt(paths: Sequence[OffsetPath], most: float) -> Look:
+        if paths is written.paths:
+            return first
+        return _looked_at(plan, write_with(paths, plan, sampled, written.vehicles, written.provenance), most)
+
+    sampled = written.movement
     (best, output, run), kept = shrink_until_equivalent(written.paths, plan.played.motion, attempt)
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
@@ -230,7 +263,7 @@ def check(plan: Plan, written: Written) -> Written:
         )  # fmt: skip
     return replace(
         best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
-        stays=written.stays, otherwise=len(kept.changes) + len(kept.smaller),
+        stays=written.stays,
     )  # fmt: skip
 
 
@@ -246,8 +279,8 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *file.notes,
         *warnings(written.vehicles.frozen),
         *written.warnings,
-        *warnings(stay_as_written(movement) if wants_lifelike else ()),
-        *warnings(written.stays),
+        *notes(stay_as_written(movement) if wants_lifelike else ()),
+        *notes(written.stays),
         *warnings(validity_warnings(movement)),
         *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )

@@ -69,7 +69,7 @@ def enrich(
     context: Contexts | None = None,
     attempts: int = 1,
     with_sensor: bool = False,
-    lane_changes: LaneChanges = LaneChanges.WRITTEN,
+    lane_changes: LaneChanges = LaneChanges.LIFELIKE,
     least_time: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
@@ -95,7 +95,7 @@ def enrich(
             return _Drawn(entity, spans, why=driver)
         seeds = of_driver(seed, entity.name, variant=variant, attempt=attempt, words=words.get(entity.name, ()))
         seen, lifelike = run.seen(index, driver, context or {}), lane_changes is LaneChanges.LIFELIKE
-        blank = _Drawn(entity, spans, driver, seen, run.crossings[index], lifelike)
+        blank = _Drawn(entity, spans, driver, seen, run.crossings[index], lifelike, unforeseen=run.unforeseen)
         return _draw(blank, driver, seeds, with_sensor, least_rows)
 
     best: Enriched | None = None
@@ -153,6 +153,7 @@ class _Drawn:
     lifelike: bool = False  # where they can be
     samples: tuple[_Sample, ...] = ()
     why: str = ""
+    unforeseen: Collection[tuple[str, ...]] = ()  # actions that nobody knows the begin of before
 
     def deviation(self, rows: IntArray | None = None) -> FloatArray:
         """On some rows or all, positive left. [m]"""
@@ -195,6 +196,7 @@ class SegmentedRun:
       leads from the segment before to the one behind
     - `neighbours`: `borrow`: a population's law of giving way, where a profile's answer is not known (`give_way`)
     - `respects_controllers`: where a controller of the player steers, nothing is sampled
+    - `unforeseen`: actions, by their names from the story down, whose begin nobody knows before
     """
 
     def __init__(
@@ -207,8 +209,9 @@ class SegmentedRun:
         continuous: Collection[str] = (),
         neighbours: Neighbours = Neighbours.BORROW,
         respects_controllers: bool = True,
+        unforeseen: Collection[tuple[str, ...]] = (),
     ) -> None:
-        self.motion, self.network, self.neighbours = motion, network, neighbours
+        self.motion, self.network, self.neighbours, self.unforeseen = motion, network, neighbours, unforeseen
         self.trailers, self.ego_dependent = trailers or {}, frozenset(ego_dependent)
         self.spans = [
             cut_segments(
@@ -275,14 +278,14 @@ def _anticipated(
 ) -> FloatArray:
     """What a driver does before his lane changes of a run, whose begin he knows, on its knots. [m]
 
-    Those are lane changes that his movement goes on through: of vehicles that depend on nobody under test.
+    Those are lane changes that his movement goes on through, and that no vehicle under test decides to begin.
     """
     time = drawn.motion.time
     offset, free = np.zeros(len(knots)), float(time[spans[0].first])
     for crossing in drawn.crossings:
         begin, end = float(time[crossing.first]), float(time[crossing.last])
         if spans[0].first <= crossing.first and crossing.last <= spans[-1].last and end > begin:
-            if crossing.is_lane_change:
+            if crossing.is_lane_change and crossing.path not in drawn.unforeseen:
                 left = side * float(crossing.way[-1]) > 0.0
                 offset += side * maneuvers.anticipation(time[knots], begin, end, left=left, free=free)
             free = end

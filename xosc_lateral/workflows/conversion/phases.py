@@ -39,12 +39,12 @@ from xosc_lateral.world.motion.offset_path import (
 from xosc_lateral.world.motion.segments import (
     Crossing,
     crossings,
-    leads_left,
     movement_runs,
 )
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, SampledDeviation, deviation_through, distance_driven
 from xosc_lateral.world.motion.way import LANE_ENDS, Break, way_of
 from xosc_lateral.world.scenario.controllers import Domains
+from xosc_lateral.world.scenario.enums import DynamicsDimension
 from xosc_lateral.world.scenario.private_actions import (
     LATERAL,
     AcquirePositionAction,
@@ -115,7 +115,7 @@ class _Phases:
                 for one in entity.segments
             ]
         )
-        self._foreseeing = bounded(self._foreseen(), self._clock)
+        self._foreseeing = bounded(self._offset, self._clock)
         self._offset = bounded(self._offset, self._clock_anywhere)
         self._spacing = self._spacing_of(motion)
         self.across, self.stays, self._crossed = dict[Path, OffsetPath](), list[str](), dict[Path, float]()
@@ -129,7 +129,8 @@ class _Phases:
         for crossing in crossings(self._plan.extended.motion, motion, runs):
             fixed = why_untouched(self._plan.played.scenario, crossing.path, motion.name)
             if why := fixed or crossing.stays or self._kept_for(crossing):
-                self.stays.append(stays_as_written(motion, crossing, why))
+                aside = "" if fixed else "; it ends where its driver is then"
+                self.stays.append(stays_as_written(motion, crossing, why + aside))
             self._crossed[crossing.path] = float(self._driven[crossing.last])
             if not fixed:
                 self.across[crossing.path] = self._to_aside(crossing) if why or not leads else self._across(crossing)
@@ -149,12 +150,16 @@ class _Phases:
         return why_kept(self._plan.played.scenario, crossing.path, motion.name)
 
     def _to_aside(self, crossing: Crossing) -> OffsetPath:
-        """As written, but for its end: there the driver drives beside the middle."""
+        """As written, but for its end: there the driver drives beside the middle; as long as without offsets."""
         motion, row, last = self._entity.motion, crossing.last, self._crossed[crossing.path]
         aside, side = float(self._offset(np.array([last]))[0]), self._way.side_at(last)
         direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
         there = direction * float(motion.offset[row]) + side * aside
-        return OffsetPath(motion.name, crossing.path, (), side, end=aside, instead=True, settles=(there, 0.0))
+        dynamics = lane_changes_of(self._plan.played.scenario, motion.name)[crossing.path][1].dynamics
+        played = next(one for one in self._own if one.path == crossing.path)
+        is_rate = dynamics.dimension is DynamicsDimension.RATE and played.end is not None
+        duration = played.end - played.start if is_rate and played.end is not None else 0.0
+        return OffsetPath(motion.name, crossing.path, (), side, end=aside, instead=True, settles=(there, duration))
 
     def _across(self, crossing: Crossing) -> OffsetPath:
         """By the distance driven; over when the written way is: the bell's last centimetres are left for later."""
@@ -171,24 +176,6 @@ class _Phases:
         pieces = tuple(pieces_along(way, clock, self._spacing, (first, last), calm_end=True))
         end = float(way(np.array([last]))[0] - crossing.way[-1])
         return OffsetPath(motion.name, crossing.path, pieces, self._way.side_at(first), end=end, instead=True)
-
-    def _foreseen(self) -> Offset:
-        """The offset, with what a driver does before lane changes that no vehicle under test decides to begin."""
-        profile, motion = self._entity.profile, self._entity.motion
-        maneuvers = None if profile is None else profile.maneuvers
-        if profile is None or maneuvers is None:
-            return self._offset
-        moved, free = np.zeros(len(motion.time)), float(motion.time[0])
-        for played in sorted(self._own, key=lambda action: action.start):
-            if played.path not in self._lateral or played.end is None or not played.end > played.start:
-                continue
-            if isinstance(played.action.content, LaneChangeAction) and played.path not in self._plan.depends.begins:
-                road = self._network.roads[int(motion.road[self._entity.segments[0].span.first])]
-                mirror = -1.0 if (road.rule == "LHT") != profile.left_hand else 1.0
-                left = leads_left(motion, self._network, played.start, played.end) == (mirror > 0.0)
-                moved += mirror * maneuvers.anticipation(motion.time, played.start, played.end, left=left, free=free)
-            free = played.end
-        return lambda distance: np.asarray(self._offset(distance) + np.interp(distance, self._driven, moved))
 
     def from_the_start(self, adding: Path | None) -> OffsetPath | None:
         """It is put down where its offsets begin, unless it is added later, or begins with a lateral action.

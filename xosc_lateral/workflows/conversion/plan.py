@@ -35,8 +35,7 @@ from xosc_lateral.world.scenario.controllers import (
 )
 from xosc_lateral.world.scenario.dependence import Dependence, dependence
 from xosc_lateral.world.scenario.entity import Entity
-from xosc_lateral.world.scenario.enums import DynamicsShape, VehicleCategory
-from xosc_lateral.world.scenario.private_actions import LaneChangeAction
+from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.scenario.scenario import Condition, Scenario, conditions_of
 
 LEAST_EXTENSION, LARGEST_EXTENSION = 1.3, 2.0
@@ -136,7 +135,7 @@ def decide(
     continuous = _on_trajectories(scenario, settings, depends, frozenset(drivers))
     version = target.version_for(scenario)
     is_lifelike = settings.lane_changes is LaneChanges.LIFELIKE
-    plan = Plan(
+    return Plan(
         settings,
         variant_index,
         scenario.path,
@@ -156,12 +155,6 @@ def decide(
         _unwritable(played, settings, version, {*egos, *controllers}),
         lateral,
     )
-    for at in scenario.storyboard.events() if is_lifelike else ():
-        for content in (action.content for action in at.event.actions):
-            is_step = isinstance(content, LaneChangeAction) and content.dynamics.shape is DynamicsShape.STEP
-            if is_step and set(at.actors) & continuous:
-                raise content.place.error("a step has no way across: take --lane-changes written")
-    return plan
 
 
 def _is_replay(settings: ConvertSettings, depends: Dependence) -> bool:

@@ -41,7 +41,7 @@ class Neighbours(StrEnum):
 
 
 class LaneChanges(StrEnum):
-    """The way across of lane changes and lane offsets of vehicles on trajectories."""
+    """The way across of lane changes and lane offsets."""
 
     WRITTEN = "written"
     LIFELIKE = "lifelike"

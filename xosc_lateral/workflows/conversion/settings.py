@@ -58,9 +58,10 @@ class ConvertSettings:
         How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
         profile's answer is not known; not at all. Without: as configured, else "borrow".
     lane_changes : {"written", "lifelike"}
-        The way across of lane changes and lane offsets of 3 to 13 s: as written, or as drivers take it (a bell that is
-        slightly early); start, duration and lane stay the file's. Of vehicles that react, lane changes whose end
-        nothing waits for, by the distance driven. Without: as configured, else "written".
+        The way across of lane changes and lane offsets of 2 to 20 s: as written, or as drivers take it (a bell that is
+        slightly early, and what moves them in their lane goes on); start, duration and lane stay the file's. Of
+        vehicles that react by the distance driven, where no event moves by more than 0.05 s. Without: as configured,
+        else "lifelike".
     mode : {"auto", "trajectory", "lane-offset"}
         Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
         those whose motion depends on a vehicle under test.
@@ -115,8 +116,8 @@ class ConvertSettings:
         "where that is not known (default); none: not at all.",
     )
     lane_changes: LaneChanges = option(
-        LaneChanges.WRITTEN, say.one_of(LaneChanges), kind=LaneChanges | None, cell=say.as_it_is, show_default=False,
-        help="The way across of lane changes: as written (default), or lifelike: as drivers take it.",
+        LaneChanges.LIFELIKE, say.one_of(LaneChanges), kind=LaneChanges | None, cell=say.as_it_is, show_default=False,
+        help="The way across of lane changes: lifelike: as drivers take it (default), or as written.",
     )
     context: Path | None = option(
         None, Path, kind=Path | None, cell=say.beside,

@@ -251,7 +251,7 @@ class _Shifts:
 
     def _longer(self, then: PlayedAction, now: PlayedAction) -> list[float]:
         """By how much longer the action may last for its way. [s]"""
-        powers = _powers(then)
+        powers = _powers(now)
         duration = (then.end or 0.0) - then.start
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
         if not powers or min(ways) < LEAST_WAY:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import BEHAVIOUR, __version__
@@ -13,9 +14,10 @@ from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.remote import leads_from
+from xosc_lateral.workflows.conversion.across import Way
 from xosc_lateral.workflows.conversion.phases import paths_of
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
-from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift
+from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift, LaneChanges
 from xosc_lateral.workflows.conversion.settings import OutputMode, relative
 from xosc_lateral.world.motion.offset_path import OffsetPath
 
@@ -33,7 +35,6 @@ class Written:
     warnings: tuple[Note, ...] = ()  # of the check
     trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
     stays: tuple[str, ...] = ()  # lane changes of these paths' entities that stay as written, a line each
-    otherwise: int = 0  # what happens otherwise in the check, and whose moves are smaller for that
 
     @property
     def with_lane_offsets(self) -> frozenset[str]:
@@ -41,12 +42,12 @@ class Written:
         return frozenset(path.entity for path in self.paths)
 
 
-def write(plan: Plan, sampled: Enriched, *, lifelike: bool, leads: bool = True) -> Written:
+def write(plan: Plan, sampled: Enriched, ways: Mapping[str, Way] = MappingProxyType({})) -> Written:
     """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked.
 
-    `lifelike`: lane changes of vehicles that react lead across as drivers take them, where they can; `leads`: not only
-    where they end.
+    `ways`: how lane changes of vehicles that react lead across, where not as the settings say.
     """
+    usual = Way.ACROSS if plan.settings.lane_changes is LaneChanges.LIFELIKE else Way.WRITTEN
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
     place = leads_from(plan.source, plan.output).parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
@@ -68,7 +69,10 @@ def write(plan: Plan, sampled: Enriched, *, lifelike: bool, leads: bool = True) 
         content_sha256=PENDING_HASH,
     )
     reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    phases = [paths_of(entity, plan, lifelike=lifelike, leads=leads) for entity in reactive]
+    phases = [
+        paths_of(entity, plan, lifelike=way > Way.WRITTEN, leads=way is Way.ACROSS)
+        for entity, way in ((one, ways.get(one.name, usual)) for one in reactive)
+    ]
     written = write_with([path for paths, _ in phases for path in paths], plan, sampled, vehicles, provenance)
     return replace(written, stays=tuple(line for _, lines in phases for line in lines))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain
 from itertools import count as numbers
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import numpy as np
 from lxml import etree
 
-from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.numbers import NORMAL_90
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
@@ -25,8 +26,7 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.maneuvers import Maneuvers
     from xosc_lateral.files.openscenario.write.draft import Draft
     from xosc_lateral.workflows.conversion.load import Played
-    from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
-    from xosc_lateral.world.surroundings.lane_order import RoadLanes
+    from xosc_lateral.world.motion.nominal import PlayedAction
 
 
 @declare_options
@@ -35,8 +35,10 @@ def vary(
     output: PathLike,
     *,
     like: Annotated[ProfileLike, flag(kind=str, metavar="PROFILE",
-        help="Profile with maneuvers: `fit --maneuvers RECORDING` makes one.")],
+        help="Profile with maneuvers: motorway, or what `fit --maneuvers RECORDING` makes.")],
     count: Annotated[int, flag("-n", "--count", min=1, max=100_000, help="Variations.")] = 100,
+    replace: Annotated[bool, flag("--replace",
+        help="Lane changes that are shorter than those of real drivers get their durations, too.")] = False,
     speeds: Annotated[bool, flag(
         help="Draw the change of speed beside each lane change, too, of vehicles that keep theirs.")] = False,
     seed: int = 0,
@@ -46,10 +48,11 @@ def vary(
 ) -> Variations:  # fmt: skip
     """Write variations of a scenario in which lane changes last as long as those of real drivers.
 
-    Drawn are durations, with --speeds changes of speed; start, lane and all else stay the scenario's. Each is one of
-    the profile's lane changes to that side: those at about its speed, in such a lane, as far behind the vehicle ahead
-    come first. Parameters that the scenario has for durations, as those of `reconstruct` and `template` do, are used,
-    others declared. `convert` and `detect` take the distribution.
+    Drawn are durations, or rates where the scenario states rates, from the profile's law for the gap ahead, with
+    --speeds changes of speed; start, lane and all else stay the scenario's. What is written shorter than 95 % of the
+    law's is varied about itself, as much as the law varies: no test gets milder. Parameters that the scenario has for
+    this, as those of `reconstruct` and `template` do, are used, others declared. `convert` and `detect` take the
+    distribution.
 
     Parameters
     ----------
@@ -82,43 +85,74 @@ def vary(
         raise DriverProfileError(what)
     played = play_scenario(Path(scenario), allowed=as_paths(allow))
     draft = Draft(played.scenario, played.motion)
-    drawn = _drawn(draft, played, profile.maneuvers, count, np.random.default_rng(seed), with_speeds=speeds)
-    if not drawn.durations:
-        raise FormatError("no lane change with a duration of its own begins", path=Path(scenario))
+    drawn = _drawn(
+        draft, played, profile.maneuvers, count, np.random.default_rng(seed), with_speeds=speeds, replaces=replace
+    )
+    if not drawn.changes:
+        raise FormatError("no lane change with a duration or rate of its own begins", path=Path(scenario))
     path = Path(scenario)
     folder = output_folder(output)
     varied, sets = folder / path.name, folder / f"{path.stem}-like-{profile.name}.xosc"
     rewrite_paths(draft, varied)
-    values = drawn.durations | drawn.speed_changes
+    values = {one.parameter: one.values for one in drawn.changes} | drawn.speed_changes
     distribution = _distribution(draft.version, varied.name, values, f"{path.name} like {profile.name}, seed {seed}")
     texts = {varied: build.document(draft.root).decode(), sets: build.document(distribution).decode()}
     claim(texts, [path], force=force)
     with together():
         for place, text in texts.items():
             write_atomically(place, text.rstrip() + "\n" + template_mark(text))
-    return Variations(varied, sets, drawn.durations, drawn.speed_changes)
+    allowed = (*as_paths(allow), *(one.parent for one in played.scenario.input_files))
+    roads = () if played.scenario.road_file is None else (played.scenario.road_file.parent,)
+    some = sorted({k for one in drawn.changes for k in np.argsort(one.durations)[[0, count // 2, -1]].tolist()})
+    after = [
+        play_scenario(varied, parameters={name: f"{rows[k]:.3f}" for name, rows in values.items()},
+                      allowed=(*allowed, *roads))
+        for k in some
+    ]  # fmt: skip
+    return Variations(varied, sets, drawn.changes, drawn.speed_changes, _closest([played]), _closest(after))
+
+
+class VariedChange(NamedTuple):
+    """One lane change: its parameter, and what is drawn for it."""
+
+    parameter: str
+    is_rate: bool  # its parameter is a rate [m/s], not a duration [s]
+    written: float  # duration of the nominal run [s]
+    law: tuple[float, float, float]  # 5, 50, 95 % of the profile's [s]
+    about_itself: bool  # drawn about what is written, which is shorter than 95 % of the profile's
+    durations: list[float]  # of each variation [s]
+    values: list[float]  # of the parameter, likewise
+
+    def __str__(self) -> str:
+        low, high = min(self.durations), max(self.durations)
+        drawn = f"{np.median(self.durations):.1f} s ({low:.1f} to {high:.1f} s)"
+        what = f"{self.parameter}: {drawn}, written {self.written:.1f} s"
+        theirs = f"the profile's take {self.law[1]:.1f} s ({self.law[0]:.1f} to {self.law[2]:.1f} s)"
+        how = f", varied about itself: {theirs}; --replace takes theirs" if self.about_itself else f"; {theirs}"
+        return what + how + ("; stated as a rate" if self.is_rate else "")
 
 
 class _Drawn(NamedTuple):
-    """Parameter -> a value for each variation: durations [s] and changes of speed [m/s]."""
+    """Lane changes, and changes of speed by parameter, for each variation [m/s]."""
 
-    durations: dict[str, list[float]]
+    changes: list[VariedChange]
     speed_changes: dict[str, list[float]]
 
 
 def _drawn(
-    draft: Draft, played: Played, maneuvers: Maneuvers, count: int, rng: np.random.Generator, *, with_speeds: bool
-) -> _Drawn:
+    draft: Draft, played: Played, maneuvers: Maneuvers, count: int, rng: np.random.Generator, *, with_speeds: bool,
+    replaces: bool,
+) -> _Drawn:  # fmt: skip
     """Draw; the draft's lane changes refer to these parameters."""
     from xosc_lateral.files.openscenario.references import parameter_name
-    from xosc_lateral.world.surroundings.lane_order import RoadLanes
+    from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
     changes, lanes = _lane_changes(draft, played), RoadLanes(played.network)
     declarations = draft.root.find("{*}ParameterDeclarations")
     if declarations is None:
         declarations = etree.Element("ParameterDeclarations")
         draft.root.insert(1, declarations)
-    drawn, declared = _Drawn({}, {}), {parameter_name(item.get("name") or "") for item in declarations}
+    drawn, declared = _Drawn([], {}), {parameter_name(item.get("name") or "") for item in declarations}
 
     def declare(action: PlayedAction, what: str, value: float) -> str:
         name = _free_name(f"{action.actor}_{action.path[-1]}_{what}", declared)
@@ -127,22 +161,35 @@ def _drawn(
         return name
 
     for action, dynamics in changes:
-        written = dynamics.get("value") or ""
-        name = parameter_name(written) if written.startswith("$") else ""
-        if name in drawn.durations:
+        stated, value = action.action.content.dynamics, dynamics.get("value") or ""
+        is_rate = stated.dimension is DynamicsDimension.RATE
+        name = parameter_name(value) if value.startswith("$") else ""
+        if any(name == one.parameter for one in drawn.changes):
             continue
         if name not in declared:
-            name = declare(action, "duration", action.action.content.dynamics.value)
+            name = declare(action, "rate" if is_rate else "duration", stated.value)
             dynamics.set("value", f"${name}")
         vehicle = next(one for one in played.motion.entities if one.name == action.actor)
         row = min(int(np.searchsorted(vehicle.time, action.start)), len(vehicle.time) - 1)
-        weights = _weights(action, vehicle, row, played, lanes, maneuvers)
-        rows = rng.choice(len(weights), size=count, p=weights)
-        drawn.durations[name] = np.round(maneuvers.column("duration")[rows], 3).tolist()
-        if with_speeds and draft.version >= (1, 1) and _keeps_speed(action, played):  # 1.0 has no expressions
-            change = declare(action, "speed_change", 0.0)
+        gap = vehicle_next(vehicle, row, played.motion.entities, lanes).gap
+        low, middle, high = maneuvers.duration(np.array([-NORMAL_90, 0.0, NORMAL_90]), gap).tolist()
+        assert action.end is not None
+        written = action.end - action.start if is_rate else stated.value
+        is_short, normal = written < low and not replaces, rng.standard_normal(count)
+        durations = maneuvers.duration(normal, gap) * (written / middle if is_short else 1.0)
+        values = stated.value * written / durations if is_rate else durations
+        drawn.changes.append(
+            VariedChange(
+                name, is_rate, written, (low, middle, high), is_short, durations.tolist(), np.round(values, 3).tolist()
+            )
+        )
+        side = "left" if leads_left(vehicle, played.network, action.start, action.end) else "right"
+        law = maneuvers.speed_change.get(side)
+        if with_speeds and law is not None and not is_rate and draft.version >= (1, 1) and _keeps_speed(action, played):
+            change = declare(action, "speed_change", 0.0)  # 1.0 has no expressions
             _add_speed_change(dynamics, action, float(vehicle.speed[row]), change, f"${name}")
-            drawn.speed_changes[change] = np.round(maneuvers.column("speed_change")[rows], 3).tolist()
+            speeds = law.mean.value + law.deviation.value * rng.standard_normal(count)
+            drawn.speed_changes[change] = np.round(speeds, 3).tolist()
     return drawn
 
 
@@ -175,7 +222,7 @@ def _add_speed_change(
 
 
 def _lane_changes(draft: Draft, played: Played) -> list[tuple[PlayedAction, etree._Element]]:
-    """The scenario's own that last for a time, in order of their begin, with the elements that say how long."""
+    """The scenario's own that end and state a time or a rate, in order of their begin, with the elements that do."""
     from xosc_lateral.files.openscenario.write.draft import source_of
 
     changes = []
@@ -185,8 +232,9 @@ def _lane_changes(draft: Draft, played: Played) -> list[tuple[PlayedAction, etre
             continue
         written = action.action.content.dynamics
         dynamics = source_of(action.action, played.scenario, draft.root).find(".//{*}LaneChangeActionDynamics")
-        is_timed = written.dimension is DynamicsDimension.TIME and written.shape is not DynamicsShape.STEP
-        if dynamics is not None and is_timed:
+        is_timed = written.dimension in (DynamicsDimension.TIME, DynamicsDimension.RATE)
+        is_over = action.end is not None and action.end > action.start and written.shape is not DynamicsShape.STEP
+        if dynamics is not None and is_timed and is_over:
             changes.append((action, dynamics))
     return changes
 
@@ -197,17 +245,37 @@ def _free_name(wanted: str, taken: set[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
-def _weights(
-    action: PlayedAction, vehicle: EntityMotion, row: int, played: Played, lanes: RoadLanes, maneuvers: Maneuvers
-) -> FloatArray:
-    """Of the profile's rows, by what the scenario's vehicle does in the row in which it begins to change lanes."""
-    from xosc_lateral.world.surroundings.lane_order import vehicle_ahead
+class Follower(NamedTuple):
+    """Who is behind a vehicle that crosses a marking: the least of several runs; infinite: nobody, or nobody closes."""
 
-    end = float(vehicle.time[-1]) if action.end is None else action.end
-    width = float(played.network.lane_width(int(vehicle.road[row]), int(vehicle.lane[row]), vehicle.s[row]))
-    left = leads_left(vehicle, played.network, action.start, end)
-    gap, _ = vehicle_ahead(vehicle, row, played.motion.entities, lanes)
-    return maneuvers.weights(left=left, speed=float(vehicle.speed[row]), lane_width=width, gap=gap)
+    headway: float  # [s]
+    time_to_collision: float  # with both speeds kept [s]
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.headway):
+            return "nobody behind"
+        closing = f"{self.time_to_collision:.1f} s to a collision"
+        return f"headway {self.headway:.2f} s, {closing if np.isfinite(self.time_to_collision) else 'not closing'}"
+
+
+def _closest(runs: list[Played]) -> dict[str, Follower]:
+    """By vehicle that changes lanes."""
+    from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
+
+    found = dict[str, Follower]()
+    for played in runs:
+        lanes, vehicles = RoadLanes(played.network), played.motion.entities
+        for action in played.motion.actions:
+            vehicle = next((one for one in vehicles if one.name == action.actor), None)
+            if vehicle is None or not isinstance(action.action.content, LaneChangeAction) or action.end is None:
+                continue
+            first, last = np.searchsorted(vehicle.time, (action.start, action.end + played.motion.step)).tolist()
+            for row in (first + 1 + np.flatnonzero(np.diff(vehicle.lane[first:last]))).tolist():
+                behind = vehicle_next(vehicle, row, vehicles, lanes, ahead=False)
+                known = found.get(vehicle.name, Follower(np.inf, np.inf))
+                least = np.fmin(known, (behind.headway, behind.time_to_collision)).tolist()
+                found[vehicle.name] = Follower(*least)
+    return found
 
 
 def _distribution(
@@ -237,29 +305,51 @@ class Variations(Result):
 
     scenario: Path  # with a parameter for each lane change
     distribution: Path  # of their values
-    durations: dict[str, list[float]]  # by parameter, for each variation [s]
-    speed_changes: dict[str, list[float]]  # likewise [m/s]
+    changes: list[VariedChange]
+    speed_changes: dict[str, list[float]]  # by parameter, for each variation [m/s]
+    # who is behind a vehicle that crosses a marking: as written, and in the variations in which a lane change is
+    # shortest, middling and longest
+    before: dict[str, Follower]
+    after: dict[str, Follower]
+
+    @property
+    def durations(self) -> dict[str, list[float]]:
+        """By parameter, for each variation. [s]"""
+        return {one.parameter: one.durations for one in self.changes}
 
     def headline(self) -> str:
         """One line."""
-        count = len(next(iter(self.durations.values())))
-        return f"{count} variations of {len(self.durations)} lane changes: {self.distribution}"
+        count = len(self.changes[0].durations)
+        return f"{count} variations of {len(self.changes)} lane changes: {self.distribution}"
 
     def __str__(self) -> str:
-        lines = [
-            f"  {name}: {np.median(values):.1f} {unit} ({min(values):.1f} to {max(values):.1f} {unit})"
-            for drawn, unit in ((self.durations, "s"), (self.speed_changes, "m/s"))
-            for name, values in drawn.items()
-        ]
-        return "\n".join([self.headline(), *lines])
+        speeds = (
+            f"{name}: {np.median(values):.1f} m/s ({min(values):.1f} to {max(values):.1f} m/s)"
+            for name, values in self.speed_changes.items()
+        )
+        return "\n".join(
+            [self.headline(), *(f"  {line}" for line in (*map(str, self.changes), *speeds, *self._near()))]
+        )
+
+    def _near(self) -> Iterator[str]:
+        for name in sorted(self.before.keys() | self.after.keys()):
+            was, now = (found.get(name, "never") for found in (self.before, self.after))
+            yield f"'{name}' crosses the marking: {was} as written, {now} at least in the variations"
 
     def to_frame(self) -> pd.DataFrame:
         """One row per variation, a column per parameter. [s], [m/s]"""
-        return pd.DataFrame(self.durations | self.speed_changes)
+        return pd.DataFrame({one.parameter: one.values for one in self.changes} | self.speed_changes)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
         return {
             "scenario": str(self.scenario), "distribution": str(self.distribution), "durations": self.durations,
+            "rates": {one.parameter: one.values for one in self.changes if one.is_rate},
+            "about_themselves": [one.parameter for one in self.changes if one.about_itself],
             "speed_changes": self.speed_changes,
+            "followers": {
+                when: {name: {key: value if np.isfinite(value) else None for key, value in one._asdict().items()}
+                       for name, one in found.items()}
+                for when, found in (("before", self.before), ("after", self.after))
+            },
         }  # fmt: skip

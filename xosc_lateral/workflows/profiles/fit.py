@@ -10,6 +10,7 @@ from xosc_lateral.workflows.result import DrivesLike, PathLike, Paths, ProfileLi
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
+    from xosc_lateral.drivers.model.maneuvers import Maneuvers
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
 
@@ -69,8 +70,8 @@ def fit(
         kind=str, read=lambda text: None if text == "none" else text, metavar="PROFILE|none",
         help="Whose fast movement it has above the band that the tables show; rural: only where they state one.",
     )] = PRIOR_PROFILE,
-    maneuvers: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="RECORDING",
-        help="Recording whose lane changes the profile holds too: what `reconstruct` reads.")] = None,
+    maneuvers: Annotated[Maneuvers | PathLike | None, flag(kind=Path, read=Path, metavar="RECORDING",
+        help="Recording whose lane changes the profile holds too, as a law: what `reconstruct` reads.")] = None,
     road: Annotated[PathLike | None, flag(kind=Path, read=Path, metavar="FILE",
         help="Road of a recording that holds none, of drives or --maneuvers: OpenDRIVE, SUMO's network.")] = None,
     library: Paths = (),
@@ -100,6 +101,7 @@ def fit(
     from xosc_lateral.drivers.model.core.registry import model_named
     from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
     from xosc_lateral.drivers.model.profile import Provenance
+    from xosc_lateral.files.source import parsed_hashes
 
     if sensor_noise is not None and not LEAST_NOISE <= sensor_noise <= MOST_NOISE:
         known = f"expected {LEAST_NOISE:g} to {MOST_NOISE:g} m, or nothing, where it is to be estimated"
@@ -130,14 +132,22 @@ def fit(
         provenance = replace(profile.provenance, fit={**profile.provenance.fit, "corrected": True})
         profile = replace(profile, model=correct_two_level(profile.model), provenance=provenance)
     if maneuvers is not None:
-        from xosc_lateral.base.plugins import service
-        from xosc_lateral.files.source import parsed_hashes
-
-        recording = Path(maneuvers)
-        profile = replace(profile, maneuvers=service("read_maneuvers")(recording, None if road is None else Path(road)))
-        inputs = {**profile.provenance.inputs, **parsed_hashes([recording])}
+        profile = replace(profile, maneuvers=_law_of(maneuvers, road))
+    if isinstance(maneuvers, str | Path):
+        inputs = {**profile.provenance.inputs, **parsed_hashes([Path(maneuvers)])}
         profile = replace(profile, provenance=replace(profile.provenance, inputs=inputs))
     return replace(profile, left_hand=left_hand)
+
+
+def _law_of(maneuvers: Maneuvers | PathLike, road: PathLike | None) -> Maneuvers:
+    """Of a recording, which an extra reads."""
+    from xosc_lateral.base.plugins import service
+    from xosc_lateral.drivers.model.maneuvers import Maneuvers
+
+    if isinstance(maneuvers, Maneuvers):
+        return maneuvers
+    law: Maneuvers = service("read_maneuvers")(maneuvers, road)
+    return law
 
 
 def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:

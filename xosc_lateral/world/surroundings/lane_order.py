@@ -395,18 +395,41 @@ def at_instants(
 ENCOUNTER_DISTANCE = 150.0  # who is farther away has nothing to do with it: 5 s at 30 m/s [m]
 
 
-def vehicle_ahead(
-    vehicle: EntityMotion, row: int, vehicles: Sequence[EntityMotion], lanes: RoadLanes
-) -> tuple[float, float]:
-    """Free space to the vehicle ahead in its lane [m], and how fast that gets less [m/s]; NaN: none is near."""
+class Following(NamedTuple):
+    """Two vehicles one behind the other in a lane; NaN: there is none within sight."""
+
+    gap: float  # free space between them [m]
+    closing: float  # how fast that gets less [m/s]
+    speed: float  # of the one behind [m/s]
+
+    @property
+    def headway(self) -> float:
+        """Of the one behind. [s]"""
+        return self.gap / self.speed if self.speed > 0.0 else np.inf
+
+    @property
+    def time_to_collision(self) -> float:
+        """With both speeds kept; infinite: they don't close. [s]"""
+        return self.gap / self.closing if self.closing > 0.0 else np.inf
+
+
+NOBODY = Following(np.nan, np.nan, np.nan)
+
+
+def vehicle_next(
+    vehicle: EntityMotion, row: int, vehicles: Sequence[EntityMotion], lanes: RoadLanes, *, ahead: bool = True
+) -> Following:
+    """A vehicle and the one ahead of it in its lane, or the one behind."""
     time = float(vehicle.time[row])
     rows = [(one, int(np.searchsorted(one.time, time - 1e-9))) for one in vehicles]
     there = [(one, k) for one, k in rows if k < len(one.time) and one.time[0] <= time + 1e-9 and one.road[k] >= 0]
     number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
     if number is None:
-        return np.nan, np.nan
-    ahead, _ = lanes.nearest([At.of(one, k) for one, k in there], number)
-    if ahead is None or ahead[1] >= ENCOUNTER_DISTANCE:
-        return np.nan, np.nan
-    other, other_row = there[ahead[0]]
-    return ahead[1], float(vehicle.speed[row] - other.speed[other_row])
+        return NOBODY
+    near = lanes.nearest([At.of(one, k) for one, k in there], number)[0 if ahead else 1]
+    if near is None or near[1] >= ENCOUNTER_DISTANCE:
+        return NOBODY
+    other, other_row = there[near[0]]
+    behind, before = float(vehicle.speed[row]), float(other.speed[other_row])
+    behind, before = (behind, before) if ahead else (before, behind)
+    return Following(near[1], behind - before, behind)
