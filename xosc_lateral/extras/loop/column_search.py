@@ -245,7 +245,7 @@ class ColumnSearch:
         sizes = np.maximum(np.linalg.norm(problem.known, axis=0), 1e-300)
         blocks = [orthonormal(problem.known / sizes, 1e-8)]
         for term in of_kind(self.fitted, kind):
-            if set(spared) < set(term.columns):
+            if spared and set(spared) < set(term.columns):
                 continue
             parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
             rows = np.array([candidate.columns in parts for candidate in candidates])
