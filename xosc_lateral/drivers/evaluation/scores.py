@@ -361,7 +361,7 @@ def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
     }
 
 
-def _beside_to_dict(number: Beside) -> dict[str, float | None]:
+def _beside_to_dict(number: Beside) -> dict[str, Any]:
     ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
     interval = list(all_significant(np.array(number.interval), 3)) if isfinite(number.error) else None
     return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio, "interval": interval}

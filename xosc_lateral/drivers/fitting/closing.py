@@ -123,7 +123,7 @@ def look(profile: DriverProfile, runs: Sequence[Run]) -> Look:
 
 def found_in(profile: DriverProfile) -> tuple[dict[str, tuple[float, float]], list[str]]:
     """What the closing look found: numbers as measured and as sampled, and which don't come back; empty: none known."""
-    found = profile.provenance.fit.get("look")
+    found: Any = profile.provenance.fit.get("look")
     try:
         numbers = {str(name): (float(was), float(now)) for name, (was, now) in found[NUMBERS].items()}
         return numbers, [name for name in found[LACKING] if name in numbers]

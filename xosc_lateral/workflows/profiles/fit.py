@@ -104,8 +104,8 @@ def fit(
     from xosc_lateral.files.source import parsed_hashes
 
     if sensor_noise is not None and not LEAST_NOISE <= sensor_noise <= MOST_NOISE:
-        known = f"expected {LEAST_NOISE:g} to {MOST_NOISE:g} m, or nothing, where it is to be estimated"
-        raise ValueError(f"sensor_noise of {sensor_noise:g} m: {known}")
+        expected = f"expected {LEAST_NOISE:g} to {MOST_NOISE:g} m, or nothing, where it is to be estimated"
+        raise ValueError(f"sensor_noise of {sensor_noise:g} m: {expected}")
     if corrected and model_named(model).model.kind != ModelKind.TWO_LEVEL:
         raise DriverProfileError(f"model {model}: only the two-level model has a corrected fit")
     tables = given_drives(drives, columns, None if maneuvers is not None else road).valid_below(valid_below)
