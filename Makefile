@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: names pages laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
+.PHONY: names pages laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed. What is installed is not listed.
 QUICK := --disable-pip-version-check --quiet --progress-bar on --no-compile
@@ -94,16 +94,12 @@ docs: $(DOCS_STAMP)
 schema: $(STAMP)
 	$(BIN)/python -m tests.kit.schema
 
-# The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI), byte for byte. What the closed loop
-# made stays as it is; `make refined` makes it anew.
+# The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI), byte for byte.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 # GNSS: the files of OpenACC's AstaZero campaign, from its catalogue (docs/real_data.md).
 GNSS ?= ASta_040719_platoon3.csv ASta_050719_platoon1.csv
 
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m laboratory.build_library $(WHEEL) $(GNSS:%=--gnss %) -o driver_profiles --keep-refined
-
-refined: $(STAMP) $(WHEEL)
 	$(BIN)/python -m laboratory.build_library $(WHEEL) $(GNSS:%=--gnss %) -o driver_profiles
 
 # The README's picture, and CONTRIBUTING's map of the imports.
