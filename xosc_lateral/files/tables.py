@@ -215,7 +215,7 @@ def frame_of(table: Any) -> pd.DataFrame:
     if not isinstance(table, pd.DataFrame):
         for lazy in ("compute", "collect"):
             table = getattr(table, lazy)() if hasattr(table, lazy) and not isinstance(table, dict) else table
-    if isinstance(table, dict):
+    if isinstance(table, dict) and not all(np.isscalar(each) for each in table.values()):
         table = pd.DataFrame(table)
     elif not isinstance(table, pd.DataFrame) and hasattr(table, "__arrow_c_stream__"):
         import pyarrow as pa

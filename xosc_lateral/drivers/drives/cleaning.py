@@ -225,8 +225,8 @@ def position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]
 
 
 def _in_centimetres(columns: Mapping[str, FloatArray]) -> str:
-    given = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
-    return " ".join(f"{name}=COLUMN:cm" for name in given)
+    columns_named = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
+    return " ".join(f"{name}=COLUMN:cm" for name in columns_named)
 
 
 def _check_units(

@@ -45,7 +45,7 @@ WANDER_RATE = 0.3  # nobody who keeps a lane moves sideways as fast half of the 
 USUAL_WIDTH = 1.8  # [m]
 FARTHEST_MEAN = 0.42  # two standard deviations of the mean offsets of 445 vehicles on a motorway: no traffic's mean [m]
 LEAST_VEHICLES = 5
-SURE = 2.0  # standard errors
+SURE_ERRORS = 2.0  # standard errors
 
 
 # ---- signs and units, by lane changes --------------------------------------------------------------------------------
@@ -69,8 +69,8 @@ def jumps_of(
         known = np.flatnonzero(np.isfinite(lane[good]))
         moved = np.diff(lane[good][known])
         when = time[known[1:]][moved != 0.0]
-        for k, one in enumerate(at.tolist()):
-            near = moved[moved != 0.0][np.abs(when - time[one]) <= JUMP_WINDOW]
+        for k, row in enumerate(at.tolist()):
+            near = moved[moved != 0.0][np.abs(when - time[row]) <= JUMP_WINDOW]
             steps[k] = near[0] if len(near) == 1 else np.nan
     return jump[at], steps
 
@@ -169,7 +169,7 @@ def of_registration(
     each = (middle + np.angle(mean * np.exp(-1j * middle))) * lane / (2.0 * np.pi)
     shift, error = float(each.mean()), float(each.std()) / np.sqrt(len(each))
     what = "the map and the positions are shifted against one another, and lane changes are not to be believed"
-    if abs(shift) - SURE * error > FARTHEST_MEAN:
+    if abs(shift) - SURE_ERRORS * error > FARTHEST_MEAN:
         side = "left" if shift > 0.0 else "right"
         head = f"traffic of {len(names)} vehicles lies {abs(shift):.2f} +- {2.0 * error:.2f} m to the {side}"
         return f"{head} of its lanes' centres: {what}"
@@ -187,7 +187,7 @@ def of_registration(
     shift = float(along @ each) / spread
     rest = each - each.mean() - shift * along
     error = float(np.sqrt(rest @ rest / max(len(rest) - 2, 1) / spread))
-    if abs(shift) - SURE * error < 0.5 * FARTHEST_MEAN:
+    if abs(shift) - SURE_ERRORS * error < 0.5 * FARTHEST_MEAN:
         return None
     x, y = shift * axis
     head = f"traffic of {len(names)} vehicles lies {abs(shift):.2f} +- {2.0 * error:.2f} m beside its lanes"
@@ -245,10 +245,10 @@ def overlaps(
     other = vehicle[first] != vehicle[second]
     first, second = first[other], second[other]
     over = np.zeros(len(first), dtype=np.bool_)
-    for one, other_one in ((first, second), (second, first)):
-        c, s = np.cos(heading[one]), np.sin(heading[one])
-        dx, dy = x[other_one] - x[one], y[other_one] - y[one]
-        over |= (np.abs(c * dx + s * dy) < 0.5 * length[one]) & (np.abs(c * dy - s * dx) < 0.5 * width[one])
+    for row, other_row in ((first, second), (second, first)):
+        c, s = np.cos(heading[row]), np.sin(heading[row])
+        dx, dy = x[other_row] - x[row], y[other_row] - y[row]
+        over |= (np.abs(c * dx + s * dy) < 0.5 * length[row]) & (np.abs(c * dy - s * dx) < 0.5 * width[row])
     a, b = np.minimum(vehicle[first], vehicle[second])[over], np.maximum(vehicle[first], vehicle[second])[over]
     pairs, count = np.unique(np.column_stack([a, b]), axis=0, return_counts=True)
     return {(int(i), int(j)): n * step for (i, j), n in zip(pairs.tolist(), count.tolist(), strict=True)}

@@ -86,7 +86,9 @@ class Detection(Result):
     @property
     def messages(self) -> tuple[Note, ...]:
         """What reading the sources told."""
-        return tuple(Note(line, path=source.label) for source in (*self.origins, *self.homes) for line in source.said)
+        return tuple(
+            Note(line, path=source.label) for source in (*self.origins, *self.homes) for line in source.told_lines
+        )
 
     def legend(self) -> Sequence[str]:
         """What the numbers count, and what can't be read from them."""

@@ -47,7 +47,7 @@ class Source:
     label: str
     scenes: Callable[[], Iterator[Scene]]
     files: tuple[Path, ...] = ()
-    said: dict[str, None] = field(default_factory=dict)  # what reading them told, a line each, in order
+    told_lines: dict[str, None] = field(default_factory=dict)  # what reading them told, a line each, in order
 
     def is_same(self, other: Source) -> bool:
         """Whether both are the same scenes."""
@@ -116,12 +116,12 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
     is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and format_of(path) == "tracks"
-    said = dict[str, None]()
+    told_lines = dict[str, None]()
     if is_table and settings.road is None:
-        read = lambda: _driven(given_drives(path, settings.columns), said)  # noqa: E731
+        read = lambda: _driven(given_drives(path, settings.columns), told_lines)  # noqa: E731
     else:
-        read = lambda: _recorded(path, settings, said)  # noqa: E731
-    return Source(path.name.split(".")[0], read, (path,), said)
+        read = lambda: _recorded(path, settings, told_lines)  # noqa: E731
+    return Source(path.name.split(".")[0], read, (path,), told_lines)
 
 
 # ---- scenarios -------------------------------------------------------------------------------------------------------
@@ -181,15 +181,15 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
 
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------
-def _driven(given: GivenDrives, said: dict[str, None]) -> Iterator[Scene]:
-    said |= dict.fromkeys(given.evidence())
-    return drive_scenes(given.drives)
+def _driven(tables: GivenDrives, told_lines: dict[str, None]) -> Iterator[Scene]:
+    told_lines |= dict.fromkeys(tables.evidence())
+    return drive_scenes(tables.drives)
 
 
-def _recorded(path: Path, settings: SourceSettings, said: dict[str, None]) -> Iterator[Scene]:
+def _recorded(path: Path, settings: SourceSettings, told_lines: dict[str, None]) -> Iterator[Scene]:
     """Tracks of several vehicles, a scene for each recording."""
     for traffic in read_recordings(path, road=settings.road, columns=settings.columns):
-        said |= dict.fromkeys(traffic.notes)
+        told_lines |= dict.fromkeys(traffic.notes)
         yield _scene_of(traffic, path, settings)
 
 
