@@ -46,7 +46,7 @@ style: $(DEV_STAMP)
 	$(BIN)/lint-imports --no-logo
 
 # Tests of names, pages and links; `tests/test_names.py` keeps the list of their files.
-LINT := $(addprefix tests/,test_names.py test_layers.py test_examples.py docs/test_pages.py world/player/test_documented.py)
+LINT := $(addprefix tests/,test_names.py test_layers.py test_examples.py docs/test_pages.py docs/test_options.py world/player/test_documented.py)
 names: $(DEV_STAMP)
 	$(BIN)/python -m pytest -q -m lint $(LINT)
 

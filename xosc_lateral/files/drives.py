@@ -72,13 +72,15 @@ def read_drives(
     """
     known = as_mapping(mapping)
     every = [paths] if isinstance(paths, str | Path) else paths
-    files = [path for one in every for path in ([one] if isinstance(one, Drive) else inputs_of([one]))]
+    files = [path for source in every for path in ([source] if isinstance(source, Drive) else inputs_of([source]))]
     named = [path for path in files if not isinstance(path, Drive)]
     if twice := {str(path) for path in named if named.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
     read = list[Drive]()
-    for one in files:
-        read += [one] if isinstance(one, Drive) else drives_of_table(read_table(one, known), known, one, lost)
+    for source in files:
+        read += (
+            [source] if isinstance(source, Drive) else drives_of_table(read_table(source, known), known, source, lost)
+        )
     return with_distinct_names(read)
 
 
@@ -167,8 +169,8 @@ def require_evidence(
             what = f"rows of {count} vehicles or drives in turns; which is whose, drive=COLUMN says"
             raise FormatError(f"drive {name}: {what}", path=path, element="column 'offset'")
         lane = columns["lane_index"][mine] if "lane_index" in columns else None
-        for all_of, found in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
-            all_of.append(found)
+        for all_of, seen in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
+            all_of.append(seen)
     if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
         raise FormatError(wrong, path=path, element="column 'time'")
     speed, most = columns.get("speed", np.zeros(0)), MAX_MEDIAN_SPEED * (2.0 if "speed" in named else 1.0)

@@ -35,12 +35,12 @@ def opened(stated: InputLike, name: str = "input") -> list[Path]:
     """Paths of all that is stated, in order."""
     items = several(stated)
     paths = list[Path]()
-    for number, one in enumerate(items, start=1):
+    for number, item in enumerate(items, start=1):
         label = name if len(items) == 1 else f"{name} {number}"
-        if isinstance(one, str | os.PathLike) and not str(one).lstrip("\ufeff \t\r\n").startswith("<"):
-            paths += inputs_of([one])  # type: ignore[list-item]
+        if isinstance(item, str | os.PathLike) and not str(item).lstrip("\ufeff \t\r\n").startswith("<"):
+            paths += inputs_of([item])  # type: ignore[list-item]
         else:
-            paths.append(_in_memory(one, label))
+            paths.append(_in_memory(item, label))
     return paths
 
 
@@ -55,13 +55,13 @@ def opened_as_one(stated: InputLike, columns: MappingLike | None = None, name: s
     return _in_memory(pd.concat([read_table(path, mapping) for path in paths], ignore_index=True), name)
 
 
-def _in_memory(one: InputLike, name: str) -> Path:
-    made = getattr(one, "data", None)  # of a conversion
-    data = made if isinstance(made, bytes) else _frame_bytes(one)
+def _in_memory(item: InputLike, name: str) -> Path:
+    made = getattr(item, "data", None)  # of a conversion
+    data = made if isinstance(made, bytes) else _frame_bytes(item)
     if data is None:
-        data = document(one, name)
+        data = document(item, name)
         assert data is not None
-    stem = Path(str(getattr(one, "name", "") or name)).name if hasattr(one, "read") else name
+    stem = Path(str(getattr(item, "name", "") or name)).name if hasattr(item, "read") else name
     ending = next((end for magic, end in KINDS.items() if data.startswith(magic)), ".csv")
     ending = next((end for tag, end in DOCUMENTS.items() if tag in data[:4096]), ending)
     file = stem if Path(stem).suffix else f"{stem}{ending}"
@@ -71,14 +71,14 @@ def _in_memory(one: InputLike, name: str) -> Path:
     return path
 
 
-def _frame_bytes(one: InputLike) -> bytes | None:
+def _frame_bytes(frame: InputLike) -> bytes | None:
     """Bytes of a table that is in memory; None: it is none."""
-    if isinstance(one, Drive):
-        one = {"time": one.time, "offset": one.offset, **one.context, "drive": [one.name] * len(one)}
-    elif hasattr(one, "headline"):
-        one = one.to_frame()
+    if isinstance(frame, Drive):
+        frame = {"time": frame.time, "offset": frame.offset, **frame.context, "drive": [frame.name] * len(frame)}
+    elif hasattr(frame, "headline"):
+        frame = frame.to_frame()
     try:
-        frame = frame_of(one)
+        frame = frame_of(frame)
     except TypeError:
         return None
     import pyarrow as pa
@@ -98,10 +98,10 @@ def _frame_bytes(one: InputLike) -> bytes | None:
     return out.getvalue()
 
 
-def is_document(one: InputLike) -> bool:
+def is_document(item: InputLike) -> bool:
     """Whether it is a scenario, or a path or folder of some, and no table in memory."""
-    if isinstance(one, bytes | bytearray | memoryview):
-        return bytes(one[:64]).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
-    if isinstance(one, str | os.PathLike) or hasattr(one, "read"):
-        return not has_magic(str(one)) or hasattr(one, "read")
-    return not isinstance(one, Drive) and not hasattr(one, "headline") and _frame_bytes(one) is None
+    if isinstance(item, bytes | bytearray | memoryview):
+        return bytes(item[:64]).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
+    if isinstance(item, str | os.PathLike) or hasattr(item, "read"):
+        return not has_magic(str(item)) or hasattr(item, "read")
+    return not isinstance(item, Drive) and not hasattr(item, "headline") and _frame_bytes(item) is None

@@ -187,17 +187,17 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None, road: P
 
     items, lost = several(drives), Counter[str]()
     label = "DataFrame" if len(items) == 1 else "DataFrame {}"
-    given: list[Path | Drive] = [
+    parts: list[Path | Drive] = [
         one
         for number, item in enumerate(items, start=1)
         for one in ([item] if isinstance(item, Drive) else opened(item, label.format(number)))
     ]
     if road is None:
-        given = [each for one in given for each in ([one] if isinstance(one, Drive) else tables_at(one))]
-    paths = [one for one in given if not isinstance(one, Drive)]
-    tables, mapping = given, columns
+        parts = [each for one in parts for each in ([one] if isinstance(one, Drive) else tables_at(one))]
+    paths = [one for one in parts if not isinstance(one, Drive)]
+    tables, mapping = parts, columns
     if (on := None if road is None else opened_as_one(road, name="road")) is not None:
-        tables = [one if isinstance(one, Drive) else _recorded(one, on, columns) for one in given]
+        tables = [one if isinstance(one, Drive) else _recorded(one, on, columns) for one in parts]
         mapping = None
     read = read_drives(tables, mapping, lost)
     return GivenDrives.of(read, paths if on is None else [*paths, on], lost)

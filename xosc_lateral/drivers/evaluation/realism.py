@@ -222,13 +222,13 @@ def _beside(
     values: Sequence[Mapping[str, float]], floors: Sequence[Mapping[str, float]], units: Mapping[str, str]
 ) -> dict[str, Beside]:
     """Means over random halves; halves differ as much as wholes drawn anew do (delete-half jackknife)."""
-    found = {}
+    measures = {}
     for name in values[0]:
         value, floor = (np.array([one[name] for one in several]) for several in (values, floors))
         with np.errstate(divide="ignore", invalid="ignore"):
             error = float(np.log(value / floor).std(ddof=1))
-        found[name] = Beside(float(value.mean()), float(floor.mean()), units.get(name, "sd"), error)
-    return found
+        measures[name] = Beside(float(value.mean()), float(floor.mean()), units.get(name, "sd"), error)
+    return measures
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:

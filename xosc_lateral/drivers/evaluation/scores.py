@@ -226,9 +226,9 @@ def verdict(profile: DriverProfile, runs: Sequence[Run], seed: int) -> spectra.V
     groups = [run.drive if len(drives) > 3 else f"{run.drive} {run.index}" for run in runs]
     sampled = []
     for k in range(min(-(-LEAST_DRIVES // len(drives)), MOST_TIMES)):
-        own = seed + 5 + 100 * k
-        free = spectra.dithered(sample_runs(profile, runs, own, same_start=False), resolution, own + 2)
-        sampled.append((free, sensor_noise(profile, free, own)))
+        band_seed = seed + 5 + 100 * k
+        free = spectra.dithered(sample_runs(profile, runs, band_seed, same_start=False), resolution, band_seed + 2)
+        sampled.append((free, sensor_noise(profile, free, band_seed)))
     measured = spectra.dithered([run.offset for run in runs], resolution, seed + 6)
     limits = [run.valid_below for run in runs if run.valid_below is not None]
     return spectra.verdict_of(measured, sampled, groups, step, min([np.inf, *limits]))

@@ -233,19 +233,19 @@ class Verdict:
         return "; ".join(self._words(of) for of in BOTH)
 
     def _words(self, of: str) -> str:
-        mine = [one for one in self.ratios if one.of == of]
+        mine = [number for number in self.ratios if number.of == of]
         if not mine:
             return f"{of} {NOT_KNOWN}: nothing to compare, runs are too short or the recording shows too little"
         verdict, up_to = self.judged(of), self.like_up_to(of)
         below = f", power alike up to {up_to:g} Hz" if up_to else ""
         if verdict == ALIKE:
             return f"{of} like other real drivers{below}, all that is compared"
-        worst = [one for one in mine if one.judged == verdict] or mine
-        worst.sort(key=lambda one: -abs(np.log(one.ratio)))
-        named = ", ".join(one.in_words() for one in worst[:NAMED_RATIOS])
+        worst = [number for number in mine if number.judged == verdict] or mine
+        worst.sort(key=lambda number: -abs(np.log(number.ratio)))
+        named = ", ".join(number.in_words() for number in worst[:NAMED_RATIOS])
         more = f" and {len(worst) - NAMED_RATIOS} more" if len(worst) > NAMED_RATIOS else ""
-        said = f"{of} unlike other real drivers" if verdict == UNLIKE else f"{of} {NOT_KNOWN}"
-        return f"{said}{below}: {named}{more}"
+        words = f"{of} unlike other real drivers" if verdict == UNLIKE else f"{of} {NOT_KNOWN}"
+        return f"{words}{below}: {named}{more}"
 
     def alarm_words(self) -> str:
         """What a test engineer asks for, in one line."""

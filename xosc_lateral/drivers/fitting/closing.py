@@ -123,10 +123,10 @@ def look(profile: DriverProfile, runs: Sequence[Run]) -> Look:
 
 def found_in(profile: DriverProfile) -> tuple[dict[str, tuple[float, float]], list[str]]:
     """What the closing look found: numbers as measured and as sampled, and which don't come back; empty: none known."""
-    found: Any = profile.provenance.fit.get("look")
+    look: Any = profile.provenance.fit.get("look")
     try:
-        numbers = {str(name): (float(was), float(now)) for name, (was, now) in found[NUMBERS].items()}
-        return numbers, [name for name in found[LACKING] if name in numbers]
+        numbers = {str(name): (float(was), float(now)) for name, (was, now) in look[NUMBERS].items()}
+        return numbers, [name for name in look[LACKING] if name in numbers]
     except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
         return {}, []
 

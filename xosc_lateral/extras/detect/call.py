@@ -157,7 +157,7 @@ def detect(
 
         if len(paths) != 1 or inputs[0].held is not None:
             raise ValueError("--like varies one scenario, in a file")
-        found = [
+        detections = [
             each
             for word in requested
             for each in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=False)
@@ -167,7 +167,7 @@ def detect(
         where = None if keep is None else Path(keep)
         law = given_profile(like, library)
         return cut_ins_like(
-            paths[0], law, found, settings, seen_with, count=count, replaces=replace, part=part, keep=where
+            paths[0], law, detections, settings, seen_with, count=count, replaces=replace, part=part, keep=where
         )
     looked_at = [source for one in inputs for source in sources_of(one.path, settings.on(one.road, one.held))]
     bands = () if band_of is None else (Path(band_of),)

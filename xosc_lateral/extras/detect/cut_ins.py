@@ -121,10 +121,10 @@ class CutIns(Result):
 
     def __str__(self) -> str:
         lines = aligned([("", "5 %", "median", "95 %"), *self._facts()])
-        found = aligned([DETECTOR_HEADINGS, *self._detectors()])
-        told = str(self.variations).splitlines()[1:]
+        table = aligned([DETECTOR_HEADINGS, *self._detectors()])
+        remarks = str(self.variations).splitlines()[1:]
         where = [] if self.kept is None else [f"files: {self.kept}"]
-        return "\n".join([self.headline(), *told, "", *lines, "", *found, "", *self.legend(), *where])
+        return "\n".join([self.headline(), *remarks, "", *lines, "", *table, "", *self.legend(), *where])
 
     def legend(self) -> Sequence[str]:
         """What the numbers are, and what can't be read from them."""

@@ -97,10 +97,10 @@ def name_states(
     run = _kept_runs(kept, lane, vehicle, time)
     first = np.flatnonzero(np.diff(run, prepend=-1))
     begin, end = time[first], time[np.r_[first[1:], len(run)][: len(first)] - 1]
-    own = (end - begin) / np.maximum(np.bincount(run) - 1, 1)  # a row stands for its step
-    edge = settings.edge - 0.5 * own[run]
+    row_seconds = (end - begin) / np.maximum(np.bincount(run) - 1, 1)  # a row stands for its step
+    edge = settings.edge - 0.5 * row_seconds[run]
     code[kept & ((time - begin[run] < edge) | (end[run] - time < edge))] = len(reasons) + 1
-    code[kept & (end - begin + own - 2 * settings.edge < settings.shortest - 1e-6)[run]] = len(reasons) + 2
+    code[kept & (end - begin + row_seconds - 2 * settings.edge < settings.shortest - 1e-6)[run]] = len(reasons) + 2
     names = pd.Index([KEPT_ROWS, *reasons, "edge", "short"])
     return pd.Categorical.from_codes(code, categories=names)
 

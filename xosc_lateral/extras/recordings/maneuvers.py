@@ -45,38 +45,38 @@ def changes_of(
     drivers: Iterable[EntityMotion], vehicles: Sequence[EntityMotion], lanes: RoadLanes
 ) -> list[VehicleChanges]:
     """Lane changes of some drivers among vehicles in the lanes of a road."""
-    found = list[VehicleChanges]()
+    measured_changes = list[VehicleChanges]()
     for vehicle in drivers:
         plan = lateral_plan(vehicle, float(vehicle.time[0]))
         if plan.is_played:
             continue
         keeping = float(np.ptp(vehicle.time)) - sum(transition.duration for transition in plan.transitions)
         aborted = 0.5 * sum(transition.aborted and not transition.cut for transition in plan.transitions)
-        own = VehicleChanges(vehicle, [], [], [], keeping, aborted)
+        changes = VehicleChanges(vehicle, [], [], [], keeping, aborted)
         free = float(vehicle.time[0])
         for transition in plan.transitions:
             if transition.lanes and not transition.cut:
                 measured, crossing = _measured(vehicle, transition, vehicles, lanes)
-                own.changes.append(measured)
-                own.crossing.append(crossing)
+                changes.changes.append(measured)
+                changes.crossing.append(crossing)
                 way = _way_before(vehicle, transition, free)
                 if way is not None:
-                    own.ways.append((SIDES[transition.lanes < 0], way))
+                    changes.ways.append((SIDES[transition.lanes < 0], way))
             free = transition.end
-        found.append(own)
-    return found
+        measured_changes.append(changes)
+    return measured_changes
 
 
-def law_of(found: Sequence[VehicleChanges], recording: str) -> Maneuvers:
+def law_of(vehicles: Sequence[VehicleChanges], recording: str) -> Maneuvers:
     """Their law; raises `NotEnoughDataError`."""
-    rows = [one for vehicle in found for one in vehicle.changes]
+    rows = [one for vehicle in vehicles for one in vehicle.changes]
     duration, gap, speed_change, end, left = np.array(rows).reshape(-1, len(MeasuredChanges._fields)).T
-    ways = [one for vehicle in found for one in vehicle.ways]
+    ways = [one for vehicle in vehicles for one in vehicle.ways]
     return fit_maneuvers(
         MeasuredChanges(duration, gap, speed_change, end, left > 0.0),
         before={side: np.array([way for other, way in ways if other == side]) for side in SIDES},
-        hours=max(sum(vehicle.keeping for vehicle in found), 1.0) / 3600.0,
-        aborted=sum(vehicle.aborted for vehicle in found), recording=recording,
+        hours=max(sum(vehicle.keeping for vehicle in vehicles), 1.0) / 3600.0,
+        aborted=sum(vehicle.aborted for vehicle in vehicles), recording=recording,
     )  # fmt: skip
 
 

@@ -197,8 +197,8 @@ Look = tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]
 def _look_at_replay(written: Written) -> Written:
     """A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made."""
     made = (one for one in written.movement.entities if one.is_enriched)
-    found = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
-    return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in found for one in some))
+    findings = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
+    return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in findings for one in some))
 
 
 def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
@@ -235,8 +235,8 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, written: Written) -> tu
             break
     why = "with the way that drivers take, what happens would happen otherwise"
     lines = (f"lane changes of '{name}' {WAY_WORDS[way]}: {why}" for name, way in sorted(ways.items()))
-    said = in_words(written.paths, plan.played.motion)
-    return replace(written, stays=(*said, *written.stays, *lines)), look
+    words = in_words(written.paths, plan.played.motion)
+    return replace(written, stays=(*words, *written.stays, *lines)), look
 
 
 def check(plan: Plan, written: Written, first: Look) -> Written:

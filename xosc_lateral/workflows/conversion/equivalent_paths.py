@@ -97,20 +97,22 @@ class EquivalentPaths:
             listed.add((shift.event, shift.entity))
             yield Note(f"{event} {its}", is_warning=True, entity=shift.entity, run=shift.run)
         yield from self._findings()
-        for one in {one.what: one for compared in reversed(self.comparisons) for one in compared.by_chance}.values():
-            what = f"{one.what} {one.how}: it hangs on a frame of the player, without offsets as well"
-            yield Note(what, entity=one.entity, run=one.run)
-        yield from (one.note for one in self.changes if one.run != NOMINAL_RUN or one.pair not in known)
+        for change in {
+            change.what: change for compared in reversed(self.comparisons) for change in compared.by_chance
+        }.values():
+            what = f"{change.what} {change.how}: it hangs on a frame of the player, without offsets as well"
+            yield Note(what, entity=change.entity, run=change.run)
+        yield from (change.note for change in self.changes if change.run != NOMINAL_RUN or change.pair not in known)
 
     def _findings(self) -> Iterator[Note]:
         """The worst of each kind for each vehicle, with its run."""
         alike: dict[tuple[str, str], list[tuple[Finding, str]]] = {}
         for compared in self.comparisons:
-            for one in compared.findings:
-                alike.setdefault((one.entity, one.kind), []).append((one, compared.run))
-        for found in alike.values():
-            worst, run = max(found, key=lambda each: each[0].size)
-            yield worst.note(run, len(found) - 1)
+            for finding in compared.findings:
+                alike.setdefault((finding.entity, finding.kind), []).append((finding, compared.run))
+        for alikes in alike.values():
+            worst, run = max(alikes, key=lambda each: each[0].size)
+            yield worst.note(run, len(alikes) - 1)
 
 
 def shrink_until_equivalent(
@@ -158,10 +160,10 @@ def shrink_until_equivalent(
 
 def changes_of(comparisons: Iterable[Comparison]) -> list[Change]:
     """Each once, as it first is."""
-    found: dict[str, Change] = {}
+    first: dict[str, Change] = {}
     for change in (one for comparison in comparisons for one in comparison.changes):
-        found.setdefault(change.what, change)
-    return list(found.values())
+        first.setdefault(change.what, change)
+    return list(first.values())
 
 
 def _blamed(

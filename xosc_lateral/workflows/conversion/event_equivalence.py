@@ -113,11 +113,11 @@ class EventEquivalence:
 
     def _alike(self, k: int, j: int) -> bool:
         """Whether everything happens in two runs of the source at the same times and places, the egos aside."""
-        (_, one), (_, other) = self._before[k], self._before[j]
-        then, now = runs_of(one.actions), runs_of(other.actions)
+        (_, this), (_, other) = self._before[k], self._before[j]
+        then, now = runs_of(this.actions), runs_of(other.actions)
         if then.keys() != now.keys() or any(abs(then[key].start - now[key].start) > EVENT_TOLERANCE for key in then):
             return False
-        for entity, twin in zip(one.entities, other.entities, strict=True):
+        for entity, twin in zip(this.entities, other.entities, strict=True):
             time = entity.time[entity.time <= twin.time[-1]]
             apart = [
                 entity.columns[name][: len(time)] - np.interp(time, twin.time, twin.columns[name]) for name in "xy"
@@ -159,10 +159,10 @@ class EventEquivalence:
                     for which in (True, False)
                 )
                 comparison = structs.replace(comparison, changes=others)
-            found = list(look_at(network, before, run, {*moved, *trajectories}, shifted=comparison.first))
+            findings = list(look_at(network, before, run, {*moved, *trajectories}, shifted=comparison.first))
             meant = (
                 Change(f"'{one.entity}' at {one.time:.1f} s", one.entity, one.time, one.what)
-                for one in found
+                for one in findings
                 if one.is_meaning
             )
             shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
@@ -171,8 +171,8 @@ class EventEquivalence:
                 for some in ((*comparison.changes, *meant), by_chance)
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            told = tuple(one for one in found if not one.is_meaning)
-            comparisons[k] = Comparison(shifts, changes, told, by_chance, shares, name)
+            remarks = tuple(one for one in findings if not one.is_meaning)
+            comparisons[k] = Comparison(shifts, changes, remarks, by_chance, shares, name)
             if len(changes_of(comparisons.values())) >= most:
                 break
         self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
@@ -185,8 +185,8 @@ class EventEquivalence:
             again = play(driven, network, step=factor * before.step, time_limit=self.limit)
             ends = before.ended_by == again.ended_by
             compared = compare_runs(driven, network, before, again, ignored=trajectories, ends=ends)
-            for one in compared.changes:
-                chance[one.about] = max(abs(one.size) + again.step, chance.get(one.about, 0.0))
+            for change in compared.changes:
+                chance[change.about] = max(abs(change.size) + again.step, chance.get(change.about, 0.0))
         return chance
 
 

@@ -106,8 +106,10 @@ class _Phases:
         has_route = any(isinstance(one.action.content, AssignRouteAction | AcquirePositionAction) for one in self._own)
         self._way = way_of(motion, self._network, reach, has_route=has_route)
         self._runs = [(one, run) for _, run in runs.runs for one in run.entities if one.name == entity.name]
-        own = [motion, *(one for one, _ in self._runs)]
-        self._clock, self._clock_anywhere = (DriverClock.fastest(own, reach, anywhere=which) for which in (False, True))
+        motions = [motion, *(one for one, _ in self._runs)]
+        self._clock, self._clock_anywhere = (
+            DriverClock.of_fastest(motions, reach, anywhere=each) for each in (False, True)
+        )
         beyond = STEP * float(way_of_clock(self._clock.speed[-1:])[0])
         self._offset: Offset = deviation_through(
             [
@@ -222,25 +224,27 @@ class _Phases:
 
     def already_there(self) -> Iterator[OffsetPath]:
         """What ends actions of the source that are over at once in one of its runs, after the same ones as there."""
-        found, moves = dict[tuple[Path, Path | None], set[Path]](), set[tuple[Path, Path | None]]()
+        histories, moves = dict[tuple[Path, Path | None], set[Path]](), set[tuple[Path, Path | None]]()
         for entity, run in self._runs:
-            own = sorted((one for one in run.actions if one.path in self._lateral), key=lambda one: one.start)
-            own = [one for one in own if one.actor == entity.name]
-            for k, one in enumerate(own):
-                if not isinstance(one.action.content, LaneChangeAction | LaneOffsetAction):
+            actions = sorted(
+                (action for action in run.actions if action.path in self._lateral), key=lambda action: action.start
+            )
+            actions = [action for action in actions if action.actor == entity.name]
+            for k, action in enumerate(actions):
+                if not isinstance(action.action.content, LaneChangeAction | LaneOffsetAction):
                     continue
-                rows = np.searchsorted(entity.time, (one.start - run.step, one.end or np.inf))
+                rows = np.searchsorted(entity.time, (action.start - run.step, action.end or np.inf))
                 places = [column[rows[0] : rows[1] + 1] for column in (entity.lane, entity.offset)]
-                before = [earlier.path for earlier in own[:k]]
-                which = one.path, before[-1] if before else None
+                before = [earlier.path for earlier in actions[:k]]
+                which = action.path, before[-1] if before else None
                 if rows[1] - rows[0] < 4 and all(float(np.ptp(place)) < LEAST_MOVE for place in places):
-                    found[which] = {*before, one.path}
+                    histories[which] = {*before, action.path}
                 else:
                     moves.add(which)  # what came before does not tell them apart
         at = np.arange(0.0, LEAST_LENGTH, SHORTEST_GAP)
         straight = (PathPiece(at, np.zeros(len(at))),)
-        for path, after in found.keys() - moves:
-            begun = found[path, after]
+        for path, after in histories.keys() - moves:
+            begun = histories[path, after]
             unless = tuple(sorted(self._lateral - begun))
             yield OffsetPath(self._entity.name, after, straight, over=path, unless=unless)
 

@@ -262,7 +262,7 @@ def _closest(runs: list[Played]) -> dict[str, Follower]:
     """By vehicle that changes lanes."""
     from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
-    found = dict[str, Follower]()
+    followers = dict[str, Follower]()
     for played in runs:
         lanes, vehicles = RoadLanes(played.network), played.motion.entities
         for action in played.motion.actions:
@@ -272,10 +272,10 @@ def _closest(runs: list[Played]) -> dict[str, Follower]:
             first, last = np.searchsorted(vehicle.time, (action.start, action.end + played.motion.step)).tolist()
             for row in (first + 1 + np.flatnonzero(np.diff(vehicle.lane[first:last]))).tolist():
                 behind = vehicle_next(vehicle, row, vehicles, lanes, ahead=False)
-                known = found.get(vehicle.name, Follower(np.inf, np.inf))
+                known = followers.get(vehicle.name, Follower(np.inf, np.inf))
                 least = np.fmin(known, (behind.headway, behind.time_to_collision)).tolist()
-                found[vehicle.name] = Follower(*least)
-    return found
+                followers[vehicle.name] = Follower(*least)
+    return followers
 
 
 def _distribution(
@@ -328,10 +328,10 @@ class Variations(Result):
             for name, values in self.speed_changes.items()
         )
         return "\n".join(
-            [self.headline(), *(f"  {line}" for line in (*map(str, self.changes), *speeds, *self._near()))]
+            [self.headline(), *(f"  {line}" for line in (*map(str, self.changes), *speeds, *self._least_gaps()))]
         )
 
-    def _near(self) -> Iterator[str]:
+    def _least_gaps(self) -> Iterator[str]:
         for name in sorted(self.before.keys() | self.after.keys()):
             was, now = (found.get(name, "never") for found in (self.before, self.after))
             yield f"'{name}' crosses the marking: {was} as written, {now} at least in the variations"

@@ -43,7 +43,7 @@ class DriverClock(Struct, frozen=True, eq=False):
     time: FloatArray  # [s]
 
     @classmethod
-    def fastest(cls, runs: Iterable[EntityMotion], length: float, *, anywhere: bool = False) -> DriverClock:
+    def of_fastest(cls, runs: Iterable[EntityMotion], length: float, *, anywhere: bool = False) -> DriverClock:
         """Of an entity in several runs. Who slows down for an ego may not have to: nobody counts as slower than before.
 
         `anywhere`: nor than behind; where a path begins is not known.

@@ -88,12 +88,12 @@ def look_at(
     for entity in after.entities:
         source = sources[entity.name]
         if entity.name in moved:
-            found = [*_drives_otherwise(network, source, entity)]
-            found += compare_tracks(source, entity, shifted)
+            findings = [*_drives_otherwise(network, source, entity)]
+            findings += compare_tracks(source, entity, shifted)
         else:
-            found = [*_elsewhere(_Both(source, entity), shifted, AS_WRITTEN)]
-        for one in found:
-            yield structs.replace(one, cause=_cause(before, one))
+            findings = [*_elsewhere(_Both(source, entity), shifted, AS_WRITTEN)]
+        for finding in findings:
+            yield structs.replace(finding, cause=_cause(before, finding))
 
 
 def compare_parts(source: Track, other: Track) -> Iterator[Finding]:
@@ -110,9 +110,12 @@ def compare_parts(source: Track, other: Track) -> Iterator[Finding]:
 def worst_of(findings: Iterable[Finding]) -> list[Finding]:
     """Of each kind and entity."""
     worst: dict[tuple[str, str], Finding] = {}
-    for one in findings:
-        if one.size > worst.get((one.entity, one.kind), one).size or (one.entity, one.kind) not in worst:
-            worst[one.entity, one.kind] = one
+    for finding in findings:
+        if (
+            finding.size > worst.get((finding.entity, finding.kind), finding).size
+            or (finding.entity, finding.kind) not in worst
+        ):
+            worst[finding.entity, finding.kind] = finding
     return list(worst.values())
 
 
@@ -157,12 +160,12 @@ class _Both:
         dx, dy = self.b - self.a
         self.ahead, self.aside, self.apart = dx * c + dy * s, dy * c - dx * s, np.hypot(dx, dy)
         gaps = np.zeros(n, dtype=np.bool_)
-        for one, place, speed in zip((source, other), (self.a, self.b), self.speed, strict=True):
-            gaps[one.breaks[one.breaks < n]] = True
+        for track, place, speed in zip((source, other), (self.a, self.b), self.speed, strict=True):
+            gaps[track.breaks[track.breaks < n]] = True
             way = np.hypot(*np.diff(place, axis=1))
             gaps[1:] |= way > 2.0 * self.step * np.maximum(speed[1:], speed[:-1]) + 0.3
-            if "activity" in one.columns:
-                gaps |= (one.activity[:n] & Activity.ACTIVE) == 0
+            if "activity" in track.columns:
+                gaps |= (track.activity[:n] & Activity.ACTIVE) == 0
         self.gap = self.around(gaps.astype(np.float64), GAP) > 0.0
         self.bend = _wrapped(np.diff(self.heading[0], prepend=self.heading[0][:1]))
 
@@ -191,11 +194,11 @@ def _elsewhere(both: _Both, shifted: float, limit: float) -> Iterator[Finding]:
         far = np.minimum(np.abs(both.ahead), np.abs(both.ahead - longer))
     far = np.where(both.gap, 0.0, far)
     for rows, most in ((both.time < shifted, limit), (both.time >= shifted, AFTER_A_SHIFT)):
-        if found := both.worst(np.where(rows, far, 0.0), most):
+        if worst := both.worst(np.where(rows, far, 0.0), most):
             begins = float(both.time[np.argmax(rows & (far > most))])
             where = "along the road" if limit == ALONG else "from where it is as written"
-            what = f"is up to {found[1]:.2f} m elsewhere {where}, from {begins:.1f} s on,"
-            yield Finding("elsewhere", both.name, found[0], found[1], what)
+            what = f"is up to {worst[1]:.2f} m elsewhere {where}, from {begins:.1f} s on,"
+            yield Finding("elsewhere", both.name, worst[0], worst[1], what)
             return
 
 
@@ -203,8 +206,8 @@ def _corner(both: _Both) -> Iterator[tuple[float, float, str]]:
     """Turn in a frame, lateral acceleration, yaw rate beyond the source's: time, size, words."""
     turns = [np.abs(_wrapped(np.diff(heading, prepend=heading[:1]))) for heading in both.heading]
     more = np.where(both.gap, 0.0, turns[1] - both.around(turns[0], LOOK_AROUND))
-    if found := both.worst(more, FRAME_TURN + YAW_RATE * max(both.step - FRAME, 0.0)):
-        yield *found, f"{1e3 * found[1]:.0f} mrad in a frame of {both.step:g} s"
+    if worst := both.worst(more, FRAME_TURN + YAW_RATE * max(both.step - FRAME, 0.0)):
+        yield *worst, f"{1e3 * worst[1]:.0f} mrad in a frame of {both.step:g} s"
     every = max(1, round(LOOK_STEP / both.step))
     step, gap = every * both.step, both.around(both.gap.astype(np.float64), LOOK_STEP)[::every] > 0.0
     accelerations, rates = list[FloatArray](), list[FloatArray]()
@@ -227,9 +230,9 @@ def _heading(both: _Both, shifted: float) -> Iterator[Finding]:
     """Against the source's, where both are at the same: a place a little ahead in a bend is turned already."""
     curved = both.around(np.abs(both.bend) / np.maximum(both.speed[0] * both.step, FRAME), WINDOW)
     turned = np.abs(_wrapped(both.heading[1] - both.heading[0])) - both.apart * curved
-    if found := both.worst(np.where(both.gap | (both.time >= shifted), 0.0, turned), HEADING):
-        what = f"is turned by {np.degrees(found[1]):.1f} degrees"
-        yield Finding("heading", both.name, *found, what, is_meaning=found[1] > LARGEST_TURN)
+    if worst := both.worst(np.where(both.gap | (both.time >= shifted), 0.0, turned), HEADING):
+        what = f"is turned by {np.degrees(worst[1]):.1f} degrees"
+        yield Finding("heading", both.name, *worst, what, is_meaning=worst[1] > LARGEST_TURN)
 
 
 def _at_rest(both: _Both) -> Iterator[Finding]:
@@ -243,18 +246,20 @@ def _at_rest(both: _Both) -> Iterator[Finding]:
         time = float(both.time[np.argmax(stands)])
         yield Finding("creeps", both.name, time, creeps, f"moves by {1e3 * creeps:.0f} mm while it stands,")
     turns = [np.abs(_wrapped(np.diff(heading, prepend=heading[:1]))) for heading in both.heading]
-    if found := both.worst(np.where(stands, turns[1] - turns[0], 0.0), TURN_AT_REST):
-        yield Finding("turns at rest", both.name, *found, f"turns by {1e3 * found[1]:.0f} mrad while it stands,")
+    if worst := both.worst(np.where(stands, turns[1] - turns[0], 0.0), TURN_AT_REST):
+        yield Finding("turns at rest", both.name, *worst, f"turns by {1e3 * worst[1]:.0f} mrad while it stands,")
 
 
 def _cause(run: NominalMotion, finding: Finding) -> str:
     """The action that it began last, in words."""
-    own = [
-        one
-        for one in run.actions
-        if one.actor == finding.entity and len(one.path) > 1 and 0.0 <= finding.time + run.step - one.start < CAUSE_TIME
+    actions = [
+        action
+        for action in run.actions
+        if action.actor == finding.entity
+        and len(action.path) > 1
+        and 0.0 <= finding.time + run.step - action.start < CAUSE_TIME
     ]
-    return f", after event '{max(own, key=lambda one: one.start).path[-2]}' began" if own else ""
+    return f", after event '{max(actions, key=lambda action: action.start).path[-2]}' began" if actions else ""
 
 
 # ---- on the road -----------------------------------------------------------------------------------------------------
@@ -263,16 +268,16 @@ def _drives_otherwise(network: RoadNetwork, source: EntityMotion, entity: Entity
     slides = [_over_window(one, np.maximum(_longer_way(one), 0.0)) for one in (source, entity)]
     row = int(np.argmax(slides[1]))
 
-    def found(kind: str, size: float, what: str, row: int) -> Finding:
+    def finding_of(kind: str, size: float, what: str, row: int) -> Finding:
         return Finding(kind, entity.name, float(entity.time[row]), size, what, is_meaning=True)
 
     if slides[1][row] > slides[0].max() + LARGEST_SLIDE:
         size = float(slides[1][row])
-        yield found("slides", size, f"is put {size:.2f} m from where it drives", row)
+        yield finding_of("slides", size, f"is put {size:.2f} m from where it drives", row)
     roads = [_roads(network, one) for one in (source, entity)]
     for k, ((road, row), (other, _)) in enumerate(zip(roads[1], roads[0], strict=False)):
         if road != other:
-            yield found("road", inf, f"drives onto road '{network.road_ids[road]}' as number {k + 1}", row)
+            yield finding_of("road", inf, f"drives onto road '{network.road_ids[road]}' as number {k + 1}", row)
             break
 
 

@@ -413,7 +413,7 @@ class Following(NamedTuple):
         return self.gap / self.closing if self.closing > 0.0 else np.inf
 
 
-NOBODY = Following(np.nan, np.nan, np.nan)
+NO_FOLLOWING = Following(np.nan, np.nan, np.nan)
 
 
 def vehicle_next(
@@ -425,10 +425,10 @@ def vehicle_next(
     there = [(one, k) for one, k in rows if k < len(one.time) and one.time[0] <= time + 1e-9 and one.road[k] >= 0]
     number = next((k for k, (one, _) in enumerate(there) if one is vehicle), None)
     if number is None:
-        return NOBODY
+        return NO_FOLLOWING
     near = lanes.nearest([At.of(one, k) for one, k in there], number)[0 if ahead else 1]
     if near is None or near[1] >= ENCOUNTER_DISTANCE:
-        return NOBODY
+        return NO_FOLLOWING
     other, other_row = there[near[0]]
     behind, before = float(vehicle.speed[row]), float(other.speed[other_row])
     behind, before = (behind, before) if ahead else (before, behind)

@@ -189,14 +189,16 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
     `dropped` in it: rows of the source that are not in the table, by reason.
     """
     states, kept = table["state"].value_counts(), table["state"] == KEPT_ROWS
-    own = table.groupby("drive", sort=False)["time"].diff().groupby(table["drive"], sort=False).median().fillna(step)
+    row_step = (
+        table.groupby("drive", sort=False)["time"].diff().groupby(table["drive"], sort=False).median().fillna(step)
+    )
     counts = Counter({str(state): int(count) for state, count in states.items()}) + Counter(about.pop("dropped", {}))
     record = ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
         rows=dict(sorted(counts.items())),
         vehicles=int(table["drive"].nunique()),
-        hours=round(float(own.reindex(table.loc[kept, "drive"]).sum()) / 3600.0, 3),
+        hours=round(float(row_step.reindex(table.loc[kept, "drive"]).sum()) / 3600.0, 3),
         **about,
     )
     return ImportedDrives(table, record)
