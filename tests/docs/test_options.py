@@ -28,7 +28,7 @@ def options() -> Iterator[tuple[str, tuple[str, ...]]]:
         for name, command in commands(each, verb(each)):
             for param in command.params:
                 if param.param_type_name == "option" and "--help" not in param.opts:
-                    yield name, tuple(param.opts)
+                    yield name, (*param.opts, *param.secondary_opts)
 
 
 def taught() -> str:

@@ -37,6 +37,7 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.openscenario.write.draft import WrittenScenario
 from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.openscenario.write.reactive import LateralActions
+from xosc_lateral.world.motion.driver_clock import DriverClock
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, approached, pieces_along, spacing_of
 from xosc_lateral.world.motion.way import RoadPlace
@@ -334,9 +335,11 @@ def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
 def sine_path(entity_name: str, after: tuple[str, ...] | None = None, *, length: float = 1500.0) -> OffsetPath:
     """20 cm to each side every 200 m, from the left turn on."""
     distance = np.arange(0.0, length, 5.0)
-    spacing = spacing_of(distance, np.full(len(distance), 25.0), np.zeros(len(distance)))
-    offset = approached(sine, 0.0, 0.0, 100.0) if after else sine
-    pieces = tuple(pieces_along(offset, spacing, [0.0, length], calm_end=False))
+    speed = np.full(len(distance), 25.0)
+    clock = DriverClock(distance, speed, distance / speed)
+    spacing = spacing_of(distance, speed, np.zeros(len(distance)), distance, clock)
+    offset = approached(sine, clock, 0.0, 0.0) if after else sine
+    pieces = tuple(pieces_along(offset, clock, spacing, [0.0, length], calm_end=False))
     return OffsetPath(entity_name, after, pieces, placed_t=None if after else 0.2, start=0.2)
 
 
