@@ -65,7 +65,7 @@ def test_a_file_that_cannot_be_imported_is_no_file_less(package: ModuleType, tmp
 def test_every_file_of_effects_that_names_none_holds_what_effects_are_made_from() -> None:
     homes = {kind.__module__.rpartition(".")[2] for kind in effects.EFFECTS}
     written = {path.stem for folder in effects.__path__ for path in Path(folder).glob("*.py")} - {"__init__"}
-    assert written - homes == {"base", "response"}
+    assert written - homes == {"base", "ends", "response"}
     assert not {Effect, ColumnEffect, HiddenEffect} & set(effects.EFFECTS)
 
 

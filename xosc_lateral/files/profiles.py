@@ -16,7 +16,6 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLatera
 from xosc_lateral.base.limits import PROFILE_SIZE
 from xosc_lateral.base.plugins import plugins, shipped_folder
 from xosc_lateral.base.texts import composed
-from xosc_lateral.drivers.fitting.maneuvers import law_of_rows
 from xosc_lateral.drivers.model.plausibility import check_profile
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata
 from xosc_lateral.drivers.model.records import plain
@@ -134,9 +133,11 @@ def _read_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
 def _with_law(values: Any) -> Any:
     """Files of older versions hold rows of lane changes, and no law."""
     held = values.get("maneuvers") if isinstance(values, dict) else None
-    return (
-        {**values, "maneuvers": law_of_rows(held).to_dict()} if isinstance(held, dict) and "sample" in held else values
-    )
+    if not isinstance(held, dict) or "sample" not in held:
+        return values
+    from xosc_lateral.drivers.fitting.maneuvers import law_of_rows
+
+    return {**values, "maneuvers": law_of_rows(held).to_dict()}
 
 
 def write_profile(profile: DriverProfile, path: str | Path) -> None:

@@ -12,7 +12,8 @@ from msgspec.structs import replace
 import xosc_lateral as xl
 from laboratory.closing_null import recorded
 from xosc_lateral.drivers.drives.drive import Run, all_runs
-from xosc_lateral.drivers.fitting.closing import found_in, in_words, look, margins_in_words
+from xosc_lateral.drivers.evaluation.look_words import found_in, in_words, margins_in_words
+from xosc_lateral.drivers.fitting.closing import look
 from xosc_lateral.drivers.fitting.fitting import fit_warnings
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile

@@ -15,8 +15,8 @@ from laboratory.library import POPULATION, SINGLE, by_ordinariness
 from tests.kit.profiles import REFINED
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.cli import main
+from xosc_lateral.drivers.evaluation.look_words import found_in, in_words
 from xosc_lateral.drivers.evaluation.metrics import free_runs
-from xosc_lateral.drivers.fitting.closing import found_in, in_words
 from xosc_lateral.files.profiles import list_profiles, read_profile
 from xosc_lateral.workflows.profiles.cards import card_text
 from xosc_lateral.workflows.profiles.violins import _density

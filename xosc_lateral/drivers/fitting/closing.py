@@ -24,6 +24,7 @@ from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import tapered_powers
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
+from xosc_lateral.drivers.evaluation.look_words import ENTRIES, LACKING, NUMBERS, ZONE
 from xosc_lateral.drivers.evaluation.spectra import slow_movement
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import segment_of
@@ -40,8 +41,8 @@ LIKE = {
     "kurtosis of lateral speed": 0.3,
     "time beyond 0.6 m": 0.55,
     "time beyond 0.9 m": 0.55,
-    (ZONE := "time near a marking"): np.inf,
-    (ENTRIES := "excursions [1/h]"): np.inf,
+    ZONE: np.inf,
+    ENTRIES: np.inf,
 }
 """Numbers, and by how much one has to differ to matter: of a mean in metres, of skewness as it is, else of the
 logarithm: one and a half times the most that true fits showed beyond chance, where any did (`laboratory/closing_null`).
@@ -55,7 +56,6 @@ LEAST_DRIVES, MOST_HOURS, DRAWS = 60, 60.0, 400  # Sampled at least, at most; se
 DOUBTED = 0.01  # Of profiles that are true, with whichever number. [-]
 # A minute beyond, a millimetre in a band, 5 mm between drives are nothing. [rows], [m], [m]
 LEAST_ROWS, LEAST_MOVEMENT, LEAST_BETWEEN = 300.0, 1e-3, 0.005
-NUMBERS, LACKING = "numbers", "not_as_measured"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,38 +119,6 @@ def look(profile: DriverProfile, runs: Sequence[Run]) -> Look:
     both = np.array([_numbers(rows, least=0.0) for rows in (real, sampled)])
     measured, made_so = np.where(plain, both, np.exp(both))
     return Look(names, measured, made_so, lack, float(np.quantile(away, 1.0 - DOUBTED)) * scale)
-
-
-def found_in(profile: DriverProfile) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    """What the closing look found: numbers as measured and as sampled, and which don't come back; empty: none known."""
-    look: Any = profile.provenance.fit.get("look")
-    try:
-        numbers = {str(name): (float(was), float(now)) for name, (was, now) in look[NUMBERS].items()}
-        return numbers, [name for name in look[LACKING] if name in numbers]
-    except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
-        return {}, []
-
-
-def in_words(profile: DriverProfile) -> str:
-    """What the closing look at a profile, or at that which it was derived from, found; empty: nobody looked."""
-    numbers, lacking = found_in(profile)
-    driver = profile.provenance.fit.get("derived_from", profile.name)
-    if lacking:
-        parts = ", ".join(f"{name} {numbers[name][0]:g} becomes {numbers[name][1]:g}" for name in lacking)
-        return f"{driver} does not drive as its drives do: {parts}"
-    return f"{driver} drives as its drives do, by {len(numbers)} numbers" if numbers else ""
-
-
-def margins_in_words(profile: DriverProfile) -> str:
-    """Time near a marking and excursions there, of the drives and as sampled under their context; empty: not known."""
-    numbers, _ = found_in(profile)
-    if "derived_from" in profile.provenance.fit or not {ZONE, ENTRIES} <= numbers.keys():
-        return ""
-    (share, made_share), (rate, made_rate) = numbers[ZONE], numbers[ENTRIES]
-    return (
-        f"within {NEAR_MARKING:g} m of a marking {share:.2%} of the time, {rate:.3g} excursions an hour, as measured; "
-        f"{made_share:.2%}, {made_rate:.3g} as sampled"
-    )
 
 
 def _sums(

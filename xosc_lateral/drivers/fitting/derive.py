@@ -21,7 +21,7 @@ from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
-from xosc_lateral.drivers.fitting.closing import in_words
+from xosc_lateral.drivers.evaluation.look_words import in_words
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drivers.model.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.drivers.model.effects.base import FACTOR_LIMIT

@@ -15,6 +15,7 @@ from xosc_lateral.base.segment import Segment
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.drives.drive import PAPER_RULES, CutRules, Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import STEP, resample
+from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting import closing
 from xosc_lateral.drivers.fitting.bands import SPLIT_AT, density_of, fast_part_of
@@ -236,7 +237,7 @@ def fit_warnings(
     """
     return [
         *profile.provenance.fit.get("evidence", ()), *_beside_given(profile, sensor_noise), *_coarse_steps(profile),
-        *_strained(profile), *([closing.in_words(profile)] if closing.found_in(profile)[1] else []),
+        *_strained(profile), *([look_words.in_words(profile)] if look_words.found_in(profile)[1] else []),
         *([] if reference is None else _band_warnings(profile, reference)),
     ]  # fmt: skip
 

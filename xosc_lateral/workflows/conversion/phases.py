@@ -175,7 +175,7 @@ class _Phases:
             across = np.interp(distance, self._driven[rows], crossing.way)
             return np.asarray(aside(distance) + across - before * (1.0 - across / crossing.way[-1]))
 
-        pieces = tuple(pieces_along(way, clock, self._spacing, (first, last), calm_end=True))
+        pieces = tuple(pieces_along(way, clock, self._spacing.doubled(), (first, last), calm_end=True))
         end = float(way(np.array([last]))[0] - crossing.way[-1])
         return OffsetPath(motion.name, crossing.path, pieces, self._way.side_at(first), end=end, instead=True)
 

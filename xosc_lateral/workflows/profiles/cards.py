@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.evaluation.spectra import spectrum
-from xosc_lateral.drivers.fitting import closing
 from xosc_lateral.drivers.model.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.files.pages.chart import SAMPLED
 from xosc_lateral.files.pages.figure import Figure
@@ -141,8 +141,8 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
-        ("margins", closing.margins_in_words(profile)),
-        ("look", closing.in_words(profile)),
+        ("margins", look_words.margins_in_words(profile)),
+        ("look", look_words.in_words(profile)),
         ("+-", interval_note(profile) if keeping.errors else ""),
         ("fitted on", _amount(known)),
         ("source", known.source),

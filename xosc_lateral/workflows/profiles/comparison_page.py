@@ -10,12 +10,12 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.texts import aligned
+from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.sizes import FAST_S, QUANTITIES, SIGNIFICANCE_LEVEL, SLOW_S, Difference, surest
-from xosc_lateral.drivers.fitting import closing
 from xosc_lateral.files.pages.chart import color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
@@ -42,7 +42,7 @@ def comparison_text(compared: Compared) -> str:
 
 def looks_of(compared: Compared) -> list[str]:
     """What the closing look found at the fit of each, a line each."""
-    return [words for each in compared.profiles if (words := closing.in_words(each.profile))]
+    return [words for each in compared.profiles if (words := look_words.in_words(each.profile))]
 
 
 FIGURES_NOTE = (

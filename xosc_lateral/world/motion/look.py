@@ -12,7 +12,6 @@ from math import inf
 
 import numpy as np
 from msgspec import Struct, structs
-from scipy.ndimage import maximum_filter1d
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.note import Note
@@ -171,8 +170,12 @@ class _Both:
 
     def around(self, values: FloatArray, time: float, step: float | None = None) -> FloatArray:
         """The largest within a time on either side. [s]"""
-        size = 2 * int(np.ceil(time / (step or self.step) - 1e-9)) + 1
-        return np.asarray(maximum_filter1d(values, size, mode="nearest"))
+        reach = int(np.ceil(time / (step or self.step) - 1e-9))
+        size, n = 2 * reach + 1, len(values)
+        padded = np.pad(values, (reach, reach + (-n - 2 * reach) % size), mode="edge").reshape(-1, size)
+        ahead = np.maximum.accumulate(padded, axis=1).ravel()  # from the begin of each block of such a size
+        behind = np.maximum.accumulate(padded[:, ::-1], axis=1)[:, ::-1].ravel()  # to its end
+        return np.asarray(np.maximum(behind[:n], ahead[size - 1 : size - 1 + n]))
 
     def worst(self, values: FloatArray, limit: float) -> tuple[float, float] | None:
         """Time and value where a column is most above a limit, where rows can be compared."""

@@ -32,6 +32,8 @@ SHORTEST_GAP, LONGEST_GAP = 1.0, 4.0
 """Between vertices where the road is straight. [m]"""
 CHORD_ERROR, CORNER, LEAST_GAP = 0.002, 0.008, 0.2
 """By which straight pieces may cut a bend [m], turn from one to the next [rad], and how short they may be. [m]"""
+LOOK_STEP, CORNER_ACCELERATION = 0.05, 1.0
+"""Looked at so often [s], corners of a path add at most so much to what a bend itself asks. [m/s2]"""
 WIDTHS = tuple(0.2 * 1.5 ** np.arange(9))
 """Standard deviations of the kernel by which movement is smoothed, tried in order: up to 5 s of the clock. [s]"""
 SPREAD = 2.0
@@ -116,6 +118,12 @@ class Spacing(Struct, frozen=True, eq=False):
         inside = np.arange(begin + 1.0, end - 0.5)  # the last gap is a half to one and a half
         return np.concatenate(([first], np.interp(inside, self.count, self.distance), [last]))
 
+    def doubled(self) -> Spacing:
+        """Twice as many, where they do not come too close: a lane change bends as much as any road."""
+        count = np.diff(self.count)
+        more = np.clip(np.diff(self.distance) / np.maximum(count, 1e-9) / LEAST_GAP, 1.0, 2.0)
+        return Spacing(self.distance, np.concatenate(([0.0], np.cumsum(count * more))), self.along)
+
 
 def spacing_of(
     distance: FloatArray, speed: FloatArray, curvature: FloatArray, along: FloatArray, clock: DriverClock
@@ -123,12 +131,14 @@ def spacing_of(
     """Every 0.1 s at these speeds [m/s], closer where it is slow in any run, and in bends [1/m]: by the chord's
     error in place and in direction.
     """
-    bend, way = (
-        np.maximum(np.abs(curvature), 1e-6),
-        np.interp(distance, clock.distance[1:], np.diff(clock.distance) / np.diff(clock.time)),
-    )
+    bend = np.maximum(np.abs(curvature), 1e-6)
+    way = np.interp(distance, clock.distance[1:], np.diff(clock.distance) / np.diff(clock.time))
+    fastest = np.maximum(np.interp(distance, clock.distance, clock.speed), 1e-3)
+    at_speed = LOOK_STEP * (fastest + CORNER_ACCELERATION / (bend * fastest))
     by_time = np.clip(VERTEX_TIME * np.abs(speed), np.minimum(SHORTEST_GAP, VERTEX_TIME * way), LONGEST_GAP)
-    gap = np.maximum(np.minimum(by_time, np.minimum(np.sqrt(8.0 * CHORD_ERROR / bend), CORNER / bend)), LEAST_GAP)
+    gap = np.maximum(
+        np.minimum.reduce([by_time, np.sqrt(8.0 * CHORD_ERROR / bend), CORNER / bend, at_speed]), LEAST_GAP
+    )
     return Spacing(distance, np.concatenate(([0.0], np.cumsum(np.diff(distance) / gap[1:]))), along)
 
 
