@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.extras.dossier.claims import (
@@ -78,6 +79,8 @@ def dossier(
             "verdict": [("see", "the profiles' dossiers; `detect` on this folder")],
         }
         return Dossier(folder.resolve().name, "folder", contents, tuple(findings), parts, _versions())
+    if isinstance(subject, str | Path) and Path(subject).is_dir():
+        raise FormatError(f"holds no {MANIFEST}, which convert SCENARIOS -o FOLDER/ writes", path=subject)
     profile = given_profile(subject, library)
     on_bench = measures.ProfileBench(profile, data)
     chosen = _about(contents.claim, "profile") + _assumed(profile)
