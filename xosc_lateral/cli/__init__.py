@@ -161,7 +161,7 @@ SIBLINGS = {
     "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
     "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
     "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"), "verify": ("diff", "status"),
-    "profiles list": ("list", "profile", "library", "list-profiles"), "template write": ("write", "new", "write-template"),
+    "profiles list": ("list", "profile", "library", "list-profiles"), "template write": ("new", "write-template"),
     "template list": ("templates", "list-templates"), "convert SCENARIO... or FOLDER": ("convert-many",),
     "import": ("import-drives", "read-drives"), "close-loop": ("loop", "identify", "refine", "plan-loop"),
 }  # fmt: skip

@@ -58,7 +58,7 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
         what = f"not well-formed XML: {error.msg}"
-        if not path.name.lower().endswith((".xosc", ".xodr")):
+        if not str(path).lower().endswith((".xosc", ".xodr")):
             what += meant_for(path)
         if _DSL.search(data):
             what = "an OpenSCENARIO DSL file: OpenSCENARIO XML is read, and there is no converter from DSL here"

@@ -68,6 +68,7 @@ def scene_of(
     origin = np.round(places[0][0]) if places else np.zeros(2)
     scene = {
         "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME_STEP, 9),
+        "start": round(float(motion.entities[0].time[0]), 3) if motion.entities and len(rows) else 0.0,
         "frames": len(rows),
         "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
