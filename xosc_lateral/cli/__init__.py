@@ -171,9 +171,9 @@ SIBLINGS = {
 def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     """What to write in place of words that are wrong usage, where that can be told from them."""
     first = next(iter(words), "")
-    said = next((word for word in words if word in VERBS), None)
-    if first.startswith("-") and said is not None:
-        yield f"options come after the verb: {said} ... {first}"
+    later = next((word for word in words if word in VERBS), None)
+    if first.startswith("-") and later is not None:
+        yield f"options come after the verb: {later} ... {first}"
     elif first not in VERBS and not first.startswith("-"):
         name = first.replace("_", "-").lower()
         yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)

@@ -86,15 +86,15 @@ def _rate(curve: Curve) -> float:
 def finding(curves: Sequence[Curve]) -> str:
     """What one detector does on the sources where it alarms least and most, in a sentence."""
     fewest, most = min(curves, key=_rate), max(curves, key=_rate)
-    told = [f"{_alarms(most)} on {most.source}"]
+    rates = [f"{_alarms(most)} on {most.source}"]
     if most is not fewest:
-        told.append(f"{_alarms(fewest)} on {fewest.source}")
+        rates.append(f"{_alarms(fewest)} on {fewest.source}")
     shares = [100.0 * float(curve.in_time[curve.detector.chosen]) for curve in curves if len(curve.leads)]
     cut_ins = sum(len(curve.leads) for curve in curves)
     low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))
     seen = f"{low} %" if low == high else f"{low} to {high} %, by source,"
     before = f"; it sees {seen} of {cut_ins} cut-ins before the marking" if shares else ""
-    return f"{curves[0].detector.label()} raises false alarms: {', '.join(told)}{before}."
+    return f"{curves[0].detector.label()} raises false alarms: {', '.join(rates)}{before}."
 
 
 def _alarms(curve: Curve) -> str:
