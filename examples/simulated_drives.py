@@ -1,4 +1,4 @@
-"""A stand-in for your own measurement: one driver, three drives of a quarter of an hour, who cuts curves by 0.3 m.
+"""A stand-in for your own measurement: one driver, three drives of a quarter of an hour, who cuts curves.
 
 python examples/simulated_drives.py [OUTPUT FOLDER]
 """
@@ -22,7 +22,7 @@ def main(out: Path) -> None:
 
 
 def curve_cutter(drives: int = 3, duration: float = 900.0) -> pd.DataFrame:
-    """Drives of somebody who aims up to 0.3 m to the inside of curves, 1.2 s ahead of them."""
+    """Drives of somebody who aims to the inside of curves, 1.2 s ahead: 0.3 m from sharp right to sharp left ones."""
     effect = curve_cutting(0.3, look_ahead=1.2)
     made = [simulate_drive(duration, seed=11 + number, effects=[effect]).table for number in range(drives)]
     return pd.concat([table.assign(drive=f"day {number}") for number, table in enumerate(made, start=1)])

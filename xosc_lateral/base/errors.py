@@ -78,6 +78,22 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 
+KINDS = {
+    (".xosc",): "a scenario, for convert, view, states, segments, vary and detect",
+    (".xodr",): "a road: name the scenario that drives on it",
+    (".json",): "JSON, as driver profiles are: -p FILE names one",
+    (".csv", ".gz", ".zst", ".parquet", ".feather", ".arrow"): "a table: fit TABLE -o PROFILE.json makes a profile",
+}
+"""Endings of files -> what they are, and where they are wanted."""
+
+
+def meant_for(path: object) -> str:
+    """`` (mine.json is JSON, as ...)`` for a file that came where another kind is wanted; nothing if it is unknown."""
+    name = str(path).replace("\\", "/").rpartition("/")[2]
+    kinds = [words for endings, words in KINDS.items() if name.lower().endswith(endings)]
+    return f" ({name} is {kinds[0]})" if kinds else ""
+
+
 def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:
     """``path:line: element: what``, leaving out what is unknown."""
     place = "" if path is None else f"{by_owner(str(path))}:" if line is None else f"{by_owner(str(path))}:{line}:"

@@ -12,7 +12,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError, did_you_mean
+from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError, did_you_mean, meant_for
 from xosc_lateral.base.limits import PROFILE_SIZE
 from xosc_lateral.base.plugins import plugins, shipped_folder
 from xosc_lateral.base.texts import composed
@@ -39,8 +39,12 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     path = Path(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
         if not path.exists() or path.is_dir():
-            raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
+            what = "no such file" + did_you_mean(path.stem, [one.stem for one in list_profiles(folders)])
+            what = "is a folder, not a profile; --library FOLDER finds its profiles by name" if path.is_dir() else what
+            raise FormatError(what, path=path)
         return path
+    if hint := meant_for(text):
+        raise FormatError(f"not a profile{hint}", path=path)
     if len(text) > LONGEST_NAME:
         raise DriverProfileError(f"{text[:20]!r}...: no profile has a name of {len(text)} characters")
     for folder in (*library_folders(folders), SHIPPED):

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.errors import FormatError, XoscLateralError, meant_for
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
@@ -48,7 +48,9 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
     if path.is_dir():
         return _parts(path)
     if not path.name.lower().endswith(TABLE_SUFFIXES):
-        raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
+        raise FormatError(
+            f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}{meant_for(path)}", path=path
+        )
     if mapping is None:
         return _read(path, low_memory=False)
     return _read(path, mapping.encoding, mapping.layout, decimal=mapping.decimal, low_memory=False)

@@ -10,7 +10,7 @@ from typing import Any, cast
 from lxml import etree
 from msgspec import Struct
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, meant_for
 from xosc_lateral.base.limits import XML_TREE
 from xosc_lateral.files.source import check_regular, guard_input, hash_of, open_source, read_source, state_key
 from xosc_lateral.files.tables import unpacked_text
@@ -58,6 +58,8 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
         what = f"not well-formed XML: {error.msg}"
+        if not str(path).lower().endswith((".xosc", ".xodr")):
+            what += meant_for(path)
         if _DSL.search(data):
             what = "an OpenSCENARIO DSL file: OpenSCENARIO XML is read, and there is no converter from DSL here"
         raise FormatError(what, path=path, line=error.lineno or None) from error

@@ -93,12 +93,18 @@ def test_the_page_opens_with_what_the_table_says(folder):
     found.write_report("finding.html")
     page = Path("finding.html").read_text()
     lead, main = page.split("<main>")
-    (sentence,) = re.findall(r"<p>([^<]+ raises false alarms an hour: [^<]+)</p>", lead)
+    (sentence,) = re.findall(r"<p>([^<]+ raises false alarms: [^<]+)</p>", lead)
     label = sentence.split(" raises false alarms")[0]
     rows = [row for row in found.rows() if escape(row["detector"]) == label]
     assert len(rows) == 2
     for row in rows:
-        assert f"{row['false_alarms_per_hour']:.1f} on {escape(row['source'])}" in sentence
+        minutes = 60.0 * row["hours"]  # of less than six no rate is made
+        said = (
+            f"{row['false_alarms_per_hour']:.1f} an hour"
+            if minutes >= 6
+            else f"{row['false_alarms']} in {minutes:.1f} min"
+        )
+        assert f"{said} on {escape(row['source'])}" in sentence
     every = {row["detector"] for row in found.rows()}
     spread = {
         name: np.ptp([row["false_alarms_per_hour"] for row in found.rows() if row["detector"] == name])
@@ -119,6 +125,9 @@ def test_the_page_plays_its_worst_cases(folder):
         assert f'<h3 id="case-{number}">' in page
         scene = json.loads(page.split(f'id="scene-{number}">')[1].split("</script>")[0])
         assert scene["entities"] and scene["lanes"]
+        shown = float(re.search(rf'<h3 id="case-{number}">.* at ([\d.]+) s', page)[1])
+        end = scene["start"] + scene["step"] * (scene["frames"] - 1)
+        assert scene["start"] <= shown <= end and end - scene["start"] <= 12.0 + 1e-9
 
 
 def test_a_folder_is_read_without_its_catalogs_and_trains_what_another_source_tests(folder):

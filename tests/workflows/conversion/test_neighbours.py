@@ -63,6 +63,8 @@ def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(
     assert main(["profiles", "show", "motorway-vehicle-1"]) == 0
     assert "neighbours beside vehicles on either side: not known, does not move" in capsys.readouterr().out
     assert main(["profiles", "show", "motorway"]) == 0
-    assert (
-        "neighbours beside vehicles on either side: moves as the drivers of its recording do" in capsys.readouterr().out
-    )
+    usual = "beside vehicles on either side: moves for them as the drivers of its recording did"
+    assert usual in capsys.readouterr().out
+    said = str(xl.convert(scenario, seed=1, time_limit=6.0))
+    assert "beside vehicles" not in said, "of what is usual there is nothing to say"
+    assert said.count("Ego") == 1, "it is under test, and told to be"

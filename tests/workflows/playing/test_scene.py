@@ -9,6 +9,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+import xosc_lateral as xl
 from tests.kit.enriched import converted, made_enriched
 from tests.kit.motion import drive, entity, together, two_roads
 from xosc_lateral.workflows.conversion.page import conversion_page
@@ -145,3 +146,24 @@ def test_a_page_with_no_present_entity_has_an_empty_player(enriched):
     nobody = replace(enriched, motion=together(gone.motion), entities=(gone,), gaps_before=(), gaps_after=())
     assert json.loads(enriched_scene(nobody))["entities"] == []
     assert "Player" in conversion_page(converted(nobody))
+
+
+def test_a_converted_scenario_is_shown_with_its_source_for_as_long_as_that_is_what_it_was_made_from(tmp_path):
+    scenario, _ = xl.write_template("cut-in", tmp_path)
+    made = xl.convert(scenario, tmp_path / "out" / "lifelike.xosc", seed=1, parameters={"ego_speed": 28})
+    frame = made.to_frame().set_index("name")
+
+    def shown() -> dict[str, dict]:
+        page = xl.play(made.output).page()
+        scene = json.loads(page.split('id="scene">')[1].split("</script>")[0])
+        return {one["name"]: one for one in scene["entities"]}
+
+    vehicles = shown()
+    assert [name for name, one in vehicles.items() if "enriched" in one] == ["CutIn", "Truck"]
+    for name in ("CutIn", "Truck"):
+        added, told = unpack(vehicles[name]["added"]), frame.loc[name, "deviation"].to_numpy()[::5]
+        assert np.abs(added - told[: len(added)]).max() < 0.02
+    scenario.write_text(scenario.read_text() + "<!-- edited -->")
+    assert not any("enriched" in one for one in shown().values())
+    scenario.unlink()
+    assert not any("enriched" in one for one in shown().values())

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.errors import SimulationError, did_you_mean
 from xosc_lateral.extras.detect.detectors import RULES, Detector
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Measured, View, measure
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene
@@ -130,8 +130,9 @@ def _started(words: Sequence[str], scene: str) -> Iterator[Callable[[dict[str, A
     try:
         program = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8")
     except OSError as error:
-        known = ", ".join([*RULES, "logistic"])
-        what = f"detector {words[0]!r} can't be started: {str(error.strerror).lower()}; built in are {known}"
+        known = [*RULES, "logistic"]
+        why = f"{str(error.strerror).lower()}{did_you_mean(words[0], known)}"
+        what = f"detector {words[0]!r} can't be started: {why}; built in are {', '.join(known)}"
         raise SimulationError(what) from error
     lines: Queue[str | None] = Queue()
     assert program.stdin is not None and program.stdout is not None

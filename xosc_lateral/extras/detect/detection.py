@@ -15,7 +15,7 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
-from xosc_lateral.extras.detect.scoring import Case, Curve, Tally, worst_of
+from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, worst_of
 from xosc_lateral.extras.detect.sources import Source
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
 from xosc_lateral.files.source import parsed_hashes
@@ -106,7 +106,10 @@ class Detection(Result):
         hours = {curve.source: float(curve.hours.sum()) for curve in self.curves}
         hours |= {one.home.source: one.home.hours for one in self.carriers}
         if few := [f"{source} ({time:.2f} h)" for source, time in hours.items() if time < 1.0]:
-            lines.append(f"Less than an hour of lane keeping, of which rates an hour are made: {', '.join(few)}.")
+            lines.append(
+                f"Less than an hour of lane keeping, so that rates are rough, and none is made of less than "
+                f"{60.0 * LEAST_HOURS:.0f} min: {', '.join(few)}."
+            )
         silent = sorted(self.still)
         if silent:
             lines.append(
@@ -257,6 +260,8 @@ def _plain(row: dict[str, Any]) -> dict[str, Any]:
 def cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     """Cells of a row, as texts; intervals of 95 %."""
     alarms = _with_interval(row, "false_alarms_per_hour", "false_alarms_low", "false_alarms_high", 1)
+    if row["hours"] < LEAST_HOURS and alarms != "-":
+        alarms = alarms_in_words(row["false_alarms"], row["hours"], alarms)
     seen = _share(row, "seen", "seen_low", "seen_high")
     in_time = _share(row, "seen_before_marking", "seen_before_marking_low", "seen_before_marking_high")
     lead = _with_interval(row, "lead_median", "lead_median_low", "lead_median_high", 2)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.extras.detect.scoring import Case, Curve
+from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack
 from xosc_lateral.files.pages.chart import ENRICHED, color_of
 from xosc_lateral.files.pages.figure import Figure
@@ -18,8 +18,6 @@ LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
 NEAR_DISTANCE = 120.0
 """Vehicles farther from the case's are left out. [m]"""
-CASE_MARGIN = 6.0
-"""Of a case, before and after its moment. [s]"""
 
 
 def detection_page(
@@ -86,15 +84,22 @@ def _rate(curve: Curve) -> float:
 
 
 def finding(curves: Sequence[Curve]) -> str:
-    """What one detector does on each source, in a sentence."""
-    rates = [f"{_rate(curve):.1f} on {curve.source}" for curve in curves]
-    seen = [
-        f"{100.0 * float(curve.in_time[curve.detector.chosen]):.0f} % of {len(curve.leads)} on {curve.source}"
-        for curve in curves
-        if len(curve.leads)
-    ]
-    before = f" Cut-ins seen before the marking: {', '.join(seen)}." if seen else ""
-    return f"{curves[0].detector.label()} raises false alarms an hour: {', '.join(rates)}.{before}"
+    """What one detector does on the sources where it alarms least and most, in a sentence."""
+    fewest, most = min(curves, key=_rate), max(curves, key=_rate)
+    rates = [f"{_alarms(most)} on {most.source}"]
+    if most is not fewest:
+        rates.append(f"{_alarms(fewest)} on {fewest.source}")
+    shares = [100.0 * float(curve.in_time[curve.detector.chosen]) for curve in curves if len(curve.leads)]
+    cut_ins = sum(len(curve.leads) for curve in curves)
+    low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))
+    seen = f"{low} %" if low == high else f"{low} to {high} %, by source,"
+    before = f"; it sees {seen} of {cut_ins} cut-ins before the marking" if shares else ""
+    return f"{curves[0].detector.label()} raises false alarms: {', '.join(rates)}{before}."
+
+
+def _alarms(curve: Curve) -> str:
+    count = int(curve.counts[:, curve.detector.chosen].sum())
+    return alarms_in_words(count, float(curve.hours.sum()), f"{_rate(curve):.1f}")
 
 
 def alarms_figure(curves: Sequence[Curve]) -> Figure:
@@ -160,7 +165,7 @@ def clip_scene(case: Case) -> str | None:
         return None
     middle = round(case.time / STEP)
     half = round(CASE_MARGIN / STEP)
-    instants = np.arange(middle - half, middle + half + 1)
+    instants = np.arange(max(0, middle - half), middle + half + 1)
     watched = case.view.track
     rows = (instants - watched.first).clip(0, len(watched) - 1)
     here = watched.x[rows], watched.y[rows]
@@ -189,4 +194,4 @@ def _motion(track: LaneTrack, instants: np.ndarray) -> EntityMotion:
     there = (rows >= 0) & (rows < len(track))
     activity = np.where(there, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
     held = track.at(rows.clip(0, len(track) - 1))
-    return EntityMotion.of(track.entity, STEP * (instants - instants[0]), **{**held.columns, "activity": activity})
+    return EntityMotion.of(track.entity, STEP * instants, **{**held.columns, "activity": activity})

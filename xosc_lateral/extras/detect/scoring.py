@@ -35,12 +35,24 @@ class Case:
     limit: float
 
 
+LEAST_HOURS = 0.1
+"""Of lane keeping that a rate is made of: in less, a single alarm would be ten an hour or more. [h]"""
+
+CASE_MARGIN = 6.0
+"""Of a case, before and after its moment: what is nearer to it is the same. [s]"""
+
+
+def alarms_in_words(count: int, hours: float, rate: str) -> str:
+    """False alarms as a rate, or, where there is too little to make one of, as they were counted."""
+    return f"{rate} an hour" if hours >= LEAST_HOURS else f"{count} in {60.0 * hours:.1f} min"
+
+
 def worst_of(cases: Sequence[tuple[str, str, Case]]) -> list[tuple[str, str, Case]]:
-    """The worst of all detectors and sources, of no vehicle twice."""
+    """The worst of all detectors and sources; none twice, be it of several detectors or in variants of a scenario."""
     worst: list[tuple[str, str, Case]] = []
     for candidate in sorted(cases, key=lambda each: -each[2].badness):
-        vehicle = candidate[2].scene.name, candidate[2].view.track.name
-        if all(vehicle != (case.scene.name, case.view.track.name) for *_, case in worst):
+        name, time = candidate[2].view.track.name, candidate[2].time
+        if all(name != case.view.track.name or abs(time - case.time) > CASE_MARGIN for *_, case in worst):
             worst.append(candidate)
     return worst[:SHOWN_CASES]
 

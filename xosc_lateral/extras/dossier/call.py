@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR, __version__
 from xosc_lateral.extras.dossier.claims import (
@@ -41,7 +42,7 @@ ENVIRONMENT = ("numpy", "scipy", "pandas", "lxml", "numba", "pyarrow", "msgspec"
 def dossier(
     subject: ProfileLike, *,
     recompute: Annotated[bool, flag("--recompute",
-        help="Compute every claim's figure here, and what detectors do.")] = False,
+        help="Also what takes longer: what detectors do; whether every output of a folder is made again.")] = False,
     data: Annotated[DrivesLike | None, flag("--data", kind=list[Path] | None, metavar="TABLE",
         help="Drives to compare the profile with, not those that it was fitted to; may be repeated.")] = None,
     claims: Annotated[PathLike | None, flag("--claims", kind=Path | None, metavar="FILE.toml",
@@ -78,20 +79,21 @@ def dossier(
             "verdict": [("see", "the profiles' dossiers; `detect` on this folder")],
         }
         return Dossier(folder.resolve().name, "folder", contents, tuple(findings), parts, _versions())
+    if isinstance(subject, str | Path) and Path(subject).is_dir():
+        raise FormatError(f"holds no {MANIFEST}, which convert SCENARIOS -o FOLDER/ writes", path=subject)
     profile = given_profile(subject, library)
     on_bench = measures.ProfileBench(profile, data)
     chosen = _about(contents.claim, "profile") + _assumed(profile)
     stated = measures.stated_by(profile)
-    findings = judged(
-        chosen, measures.PROFILE_MEASURES, on_bench, stated, measures.PROFILE_MEASURES if recompute else ()
-    )
-    parts = _profile_parts(profile)
+    findings = judged(chosen, measures.PROFILE_MEASURES, on_bench, stated, measures.COMPUTED)
+    parts = _profile_parts(profile) | {"verdict": contents.verdict}
     if recompute:
         from xosc_lateral.extras.detect.detection import cells
 
         rows = [(cell[1], f"{cell[0]}: {cell[2]} false alarms an hour; cut-ins seen: {cell[3]}")
                 for cell in map(cells, on_bench.detection.rows())]  # fmt: skip
-        parts["verdict"] = [*rows, ("how", "built-in detectors at their thresholds; intervals: 95 %, by vehicles")]
+        how = ("computed here", "built-in detectors at their thresholds; intervals: 95 %, by vehicles")
+        parts["verdict"] = [how, *rows, *contents.verdict]
     return Dossier(
         profile.name,
         "profile",
@@ -139,9 +141,6 @@ def _profile_parts(profile: DriverProfile) -> dict[str, list[tuple[str, str]]]:
     return {
         "validity": [*validity, *(row for row in rows if row[0] == "neighbours")],
         "data": [row for row in rows if row[0] not in ("valid", "model", "effect", "neighbours")],
-        "verdict": [
-            ("not computed", "`--recompute` counts alarms of the built-in detectors with and without movement")
-        ],
     }
 
 

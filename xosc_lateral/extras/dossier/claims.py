@@ -27,6 +27,8 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     at_least: float | None = None
     at_most: float | None = None
     test: str = ""
+    figure: str = ""  # that the package's makers found; `origin`: when, and by which command
+    origin: str = ""
 
     @property
     def bound(self) -> str:
@@ -42,13 +44,14 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 class Contents(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a dossier says; `clauses`: part -> what it answers; `tool`: uses, what can go wrong, and what finds it;
-    `process`: what else an assessor asks for, and the answer."""
+    `process`: what else an assessor asks for, and the answer; `verdict`: what is known of verdicts on the road."""
 
     purpose: str = ""
     clauses: dict[str, list[str]] = {}
     claim: list[Claim] = []
     tool: list[dict[str, str]] = []
     process: list[dict[str, str]] = []
+    verdict: list[tuple[str, str]] = []
 
 
 class State(StrEnum):
@@ -91,8 +94,9 @@ def contents_of(path: Path | None) -> Contents:
         return contents
     users = _read(path)
     claims = {claim.id: claim for claim in (*contents.claim, *users.claim)}
-    return Contents(users.purpose or contents.purpose, contents.clauses | users.clauses, [*claims.values()],
-                    [*contents.tool, *users.tool])  # fmt: skip
+    return msgspec.structs.replace(contents, purpose=users.purpose or contents.purpose,
+                                   clauses=contents.clauses | users.clauses, claim=[*claims.values()],
+                                   tool=[*contents.tool, *users.tool])  # fmt: skip
 
 
 def _read(path: Path) -> Contents:
@@ -132,9 +136,12 @@ def judged(
         if value is None:
             value = stated.get(claim.measure)
             state = State.STATED if measure is not None else State.UNTESTED
-            origin = "" if value is None else "stated by the profile, from drives that it was not fitted to"
-            if value is None and measure is not None:
+            if value is not None:
+                origin = "stated by the profile, from drives that it was not fitted to; --data TABLE: from yours"
+            elif measure is not None:
                 origin = "its drives are needed: --data" if claim.measure in computed else "not computed: --recompute"
+            else:
+                origin = claim.origin
         if value is not None and not claim.allows(value):
             state = State.BROKEN
         findings.append(Finding(claim, state, value, origin))

@@ -138,6 +138,10 @@ PROFILE_MEASURES: Mapping[str, Measure] = {
 }
 
 
+COMPUTED = tuple(PROFILE_MEASURES)
+"""Of a profile, without being asked: half a minute."""
+
+
 def stated_by(profile: DriverProfile) -> dict[str, float]:
     """What a profile says of its own evaluation, by measure."""
     places = {"short_ratio": "snippets", "long_ratio": "long_snippets"}

@@ -14,7 +14,8 @@ TITLES = {
 }
 """Parts that are tables of two columns."""
 
-_COLOURS = {State.HOLDS: "#1a7f37", State.BROKEN: "#c62828", State.STATED: "#8a6d00", State.UNTESTED: "#8a6d00"}
+_COLOURS = {State.HOLDS: "good", State.BROKEN: "bad", State.STATED: "ink", State.UNTESTED: "muted"}
+"""Of a page's own, which are legible in light and dark."""
 
 
 def dossier_page(
@@ -27,9 +28,14 @@ def dossier_page(
     """HTML; equal values, equal bytes. `parts`: what is known besides the claims, by part."""
     page = Page(f"Dossier: {subject}")
     page.lead(f"{len(findings)} claims: {summary_of(findings)}.")
-    counts = {state: sum(finding.state is state for finding in findings) for state in State}
-    tones: dict[State, Tone] = {State.BROKEN: "bad"} if counts[State.BROKEN] else {State.HOLDS: "good"}
-    page.key_figures(KeyFigure(count, str(state), tone=tones.get(state, "")) for state, count in counts.items())
+    tones: dict[State, Tone] = {State.BROKEN: "bad", State.HOLDS: "good"}
+    page.key_figures(
+        KeyFigure(
+            one.value, one.claim.id.replace("-", " "), f"{one.claim.unit}: {one.claim.bound}", tones.get(one.state, "")
+        )
+        for one in findings
+        if one.value is not None
+    )
     for finding in findings:
         if finding.state is State.BROKEN:
             page.warning(f"Broken claim: {finding.claim.words}")
@@ -63,8 +69,8 @@ def _claim_row(finding: Finding) -> dict[str, object]:
     claim, value = finding.claim, finding.value
     return {
         "claim": claim.words,
-        "state": Html(f'<strong style="color:{_COLOURS[finding.state]}">{inline(finding.state)}</strong>'),
-        "figure": None if value is None else f"{value:.3g} {claim.unit}",
+        "state": Html(f'<strong style="color:var(--{_COLOURS[finding.state]})">{inline(finding.state)}</strong>'),
+        "figure": claim.figure if value is None else f"{value:.3g} {claim.unit}",
         "bound": claim.bound,
         "from": finding.origin,
         "test": f"`{claim.test}`" if claim.test else "none",

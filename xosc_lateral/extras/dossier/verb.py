@@ -17,7 +17,7 @@ app = group_of_verbs()
 
 @command(
     app, "dossier", VERBS["dossier"],
-    "dossier motorway -o dossier.html --recompute",
+    "dossier motorway -o dossier.html", "dossier motorway --recompute",
     "dossier enriched/ -o dossier.html --claims ours.toml",
 )
 def dossier(

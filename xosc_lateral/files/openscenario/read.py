@@ -9,7 +9,7 @@ from pathlib import Path, PureWindowsPath
 from lxml import etree
 from msgspec import Struct
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, meant_for
 from xosc_lateral.base.note import Note
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
@@ -165,7 +165,8 @@ def open_scenario(document: etree._Element, path: Path) -> XmlElement:
     """Root element of any OpenSCENARIO file."""
     root = XmlElement(document, path, Scope({}))
     if local_name(document).lower() != "openscenario":
-        root.fail(f"the root element is '{local_name(document)[:40]}', not OpenSCENARIO")
+        name = local_name(document)[:40]
+        root.fail(f"the root element is '{name}', not OpenSCENARIO{meant_for('.xodr') if name == 'OpenDRIVE' else ''}")
     return root
 
 

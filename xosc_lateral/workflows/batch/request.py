@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.errors import FormatError, XoscLateralError, meant_for
 from xosc_lateral.base.limits import PARAMETER_SETS, XML_TREE
 from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.provenance import HEADER_MARK
@@ -160,7 +160,7 @@ def read_request_table(rows: Path | pd.DataFrame, settings: ConvertSettings, *, 
         table, path, base = as_text(rows), Path("DataFrame"), None
     if "scenario" not in table.columns:
         known = ", ".join(map(str, table.columns[:12]))
-        raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
+        raise FormatError(f"no column 'scenario'; there are {known}{meant_for(path)}", path=path, line=1)
     for name in map(str, table.columns):  # what is not understood is a setting that would be ignored
         if name not in COLUMNS and not name.startswith(PREFIXES):
             known = ", ".join((*COLUMNS, *(f"{prefix}NAME" for prefix in PREFIXES)))

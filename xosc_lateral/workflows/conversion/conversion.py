@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.model.profile import SIDES
+from xosc_lateral.drivers.model.profile import SIDES, UNMEASURED_RESPONSES, Basis
 from xosc_lateral.files.atomic import together
 from xosc_lateral.files.output_paths import claim, label_files, output_file
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
@@ -46,13 +46,17 @@ class Conversion(ConvertedScenario, Result):
                     f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
                     f"as {MODE_WORDS.get(mode, mode)}"
                 )
-            else:
+            elif entity.name not in self.egos:  # those are told
                 lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
         alike: dict[str, list[str]] = {}
         for entity in self.movement.entities:
             if entity.is_enriched:
                 alike.setdefault(entity.beside(self.provenance.options["neighbours"]), []).append(entity.name)
-        lines += [f"  {', '.join(names)} {words}" for words, names in alike.items()]
+        lines += [
+            f"  {', '.join(names)}, {words}"
+            for words, names in alike.items()
+            if UNMEASURED_RESPONSES[Basis.POPULATION] not in words  # what is usual
+        ]
         if self.provenance.options["with_sensor"]:
             lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
         lines += self.message_lines()

@@ -17,7 +17,7 @@ from xosc_lateral.workflows.conversion.result import (
 )
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE
 from xosc_lateral.workflows.playing import figures as figures
-from xosc_lateral.workflows.playing.figures import USUAL_ACCELERATION, add_notes
+from xosc_lateral.workflows.playing.figures import PLAYER_WORDS, USUAL_ACCELERATION, add_notes
 from xosc_lateral.workflows.playing.scene import scene_of
 from xosc_lateral.world.motion.gaps import MAXIMUM_GAP, Following, closest_following, road_path
 
@@ -63,9 +63,8 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         page.warning(warning)
     page.section(
         "Player",
-        "The scenario from above: as written, and below it lifelike, with written places as dashed outlines. Across "
-        "the road everything is drawn wider, so that decimetres become visible. Click a vehicle to follow it, point at "
-        "it for its values, drag to look elsewhere.",
+        "The scenario from above: as written, and below it lifelike, with written places as dashed outlines. "
+        + PLAYER_WORDS,
     )
     page.player(
         scene_of(enriched.motion, enriched.network, enriched.entities), "Scenario from above, nominal and enriched"

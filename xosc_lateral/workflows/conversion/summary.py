@@ -33,7 +33,7 @@ def summary_of(conversion: ConvertedScenario, path: Path) -> dict[Path, str]:
         f"### {_cell(conversion.source.name)}: lateral movement added",
         "",
         f"{len(done)} of {len(enriched.entities)} entities, {enriched.motion.end_time:.1f} s, nominal run, seed "
-        f"{made.options['seed']}, variant {made.variant}. {_cell(conversion.under_test)}.",
+        f"{made.options['seed']}, variant {made.variant}; {_cell(conversion.under_test)}.",
         "",
     ]
     tiles = key_figures(enriched, done)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, notes
 from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.source import parsed_hashes
+from xosc_lateral.files.source import file_hash, parsed_hashes
 from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
 from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from xosc_lateral.files.held import Held
     from xosc_lateral.files.pages.figure import Figure
     from xosc_lateral.workflows.conversion.load import Played
+    from xosc_lateral.world.motion.nominal import Traffic
     from xosc_lateral.world.motion.segments import SegmentRow
 
 
@@ -180,12 +182,10 @@ class Playback(Result):
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
-        from xosc_lateral.files.openscenario.provenance import facts_in
         from xosc_lateral.workflows.playing.figures import view_page
 
-        motion, network = self._played.motion, self._played.network
-        converted = facts_in(self._played.scenario.source)
-        return view_page(motion, network, source=self.scenario.name, provenance=self._provenance(), converted=converted)
+        scene, played = self._scene(), self._played
+        return view_page(played.motion, scene, self.scenario.name, self._provenance(), self._converted)
 
     def write_page(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page that plays the scenario; into a folder as ``NAME_view.html``."""
@@ -204,9 +204,39 @@ class Playback(Result):
         return write_animation(self._scene(), path, usual_name=self.scenario.stem, inputs=self.files, force=force)
 
     def _scene(self) -> str:
-        from xosc_lateral.workflows.playing.scene import scene_of
+        from xosc_lateral.workflows.playing.scene import remade, scene_of
 
-        return scene_of(self._played.motion, self._played.network)
+        motion, written, moved = self._played.motion, self._as_written(), (self._converted or {}).get("profiles")
+        both = [] if written is None else remade(written, motion, moved if isinstance(moved, dict) else {})
+        return scene_of(motion, self._played.network, both)
+
+    @property
+    def _converted(self) -> Mapping[str, Any] | None:
+        """What the file says of its conversion, if it was converted."""
+        from xosc_lateral.files.openscenario.provenance import facts_in
+
+        return facts_in(self._played.scenario.source)
+
+    def _as_written(self) -> Traffic | None:
+        """The run of the scenario that this one was made from, where its source lies beside it as it was then."""
+        from xosc_lateral.files.openscenario.read import RoadSearch
+        from xosc_lateral.workflows.conversion.load import play_scenario
+
+        facts = self._converted or {}
+        options, inputs, name = facts.get("options"), facts.get("inputs"), facts.get("scenario")
+        if not (isinstance(options, dict) and isinstance(inputs, dict) and isinstance(name, str)):
+            return None
+        source, values = self.scenario.parent / name, options.get("parameters")
+        try:
+            if file_hash(source) not in inputs.values():
+                return None
+            parameters = {key: str(value) for key, value in values.items()} if isinstance(values, dict) else {}
+            road = self._played.scenario.road_file
+            played = play_scenario(source, parameters=parameters, step=self._played.motion.step,
+                                   time_limit=self.end_time, roads=RoadSearch(road))  # fmt: skip
+        except (OSError, XoscLateralError):  # it is gone, or whatever it names
+            return None
+        return played.motion
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""

@@ -16,11 +16,10 @@ from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, 
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, shown_rows
-from xosc_lateral.workflows.playing.scene import lane_surfaces, markings, scene_of
+from xosc_lateral.workflows.playing.scene import lane_surfaces, markings
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing
 from xosc_lateral.world.road.lanes import DRIVING
-from xosc_lateral.world.road.network import RoadNetwork
 
 Rows = NDArray[np.int64]
 
@@ -250,13 +249,12 @@ def timeline(enriched: Enriched) -> Figure:
 # ---- The page of a played scenario, before anything is converted ----
 def view_page(
     motion: NominalMotion,
-    network: RoadNetwork,
-    *,
+    scene: str,
     source: str,
     provenance: Mapping[str, object],
     converted: Mapping[str, Any] | None = None,
 ) -> str:
-    """HTML page with the player, self-contained; same input, same bytes.
+    """HTML page with the player of a scene, self-contained; same input, same bytes.
 
     `source`: file name, for the reader; `provenance`: for the footer; `converted`: what the file says of its
     conversion, if it was converted.
@@ -268,12 +266,9 @@ def view_page(
         f"{count} {'entity' if count == 1 else 'entities'}, {motion.end_time:.1f} s (ended by the {motion.ended_by}). "
         + (NOT_CONVERTED if converted is None else f"Converted by xosc-lateral, with lateral movement of {drivers}.")
     )
-    page.section(
-        "Player",
-        "The scenario from above. A lateral stretch above 1 widens the road. Click a vehicle to follow it, point at it "
-        "for its values, drag to look elsewhere.",
-    )
-    page.player(scene_of(motion, network), "Scenario from above")
+    beside = "" if '"enriched"' not in scene else " As written, and below it lifelike, with written places as outlines."
+    page.section("Player", f"The scenario from above.{beside} {PLAYER_WORDS}")
+    page.player(scene, "Scenario from above")
     page.section("Speed")
     page.figure(
         speeds_over_time(motion),
@@ -285,6 +280,10 @@ def view_page(
     return page.html(provenance)
 
 
+PLAYER_WORDS = (
+    "Across the road, everything is drawn as many times wider as the lateral stretch says; at 1 it is as it is. Click "
+    "a vehicle to follow it, point at it for its values, drag to look elsewhere."
+)
 NOT_CONVERTED = "The maneuvers are played as the scenario states them; no lateral movement was added to them."
 
 

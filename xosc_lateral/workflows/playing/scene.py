@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,14 +47,36 @@ LINE_TOLERANCE = 0.01
 """Lines are simplified to this: less than a tenth of a marking's width. [m]"""
 
 
+class Remade(NamedTuple):
+    """A vehicle as it was written, and as the output that was made of it plays."""
+
+    motion: EntityMotion
+    trajectory: Track
+    deviation: FloatArray  # positive left, shape (n,) [m]
+    is_enriched: bool
+
+
+def remade(written: Traffic, made: Traffic, moved: Collection[str]) -> list[Remade]:
+    """Vehicles of both runs for as long as both last; `moved`: who has lateral movement."""
+    outputs = {entity.name: entity for entity in made.entities}
+    both = [(entity, outputs[entity.name]) for entity in written.entities if entity.name in outputs]
+    results = []
+    for one, other in both:
+        rows = slice(0, min(len(one), len(other)))
+        before, after = one.at(rows), other.at(rows)
+        left = np.cos(before.heading) * (after.y - before.y) - np.sin(before.heading) * (after.x - before.x)
+        results.append(Remade(before, after, left, before.name in moved))
+    return results
+
+
 def scene_of(
-    motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult] = (), *, names: Sequence[str] = ()
+    motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult | Remade] = (), *, names: Sequence[str] = ()
 ) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone.
 
     `names`: of all vehicles in the order that decides on their colours; without: the motion's own
     """
-    pairs: list[tuple[EntityMotion, EntityResult | None]] = [(result.motion, result) for result in results]
+    pairs: list[tuple[EntityMotion, EntityResult | Remade | None]] = [(result.motion, result) for result in results]
     pairs = pairs or [(entity, None) for entity in motion.entities]
     place = {name: number for number, name in enumerate(names)}
     shown = [
@@ -62,12 +84,13 @@ def scene_of(
         for number, (entity, result) in enumerate(pairs)
         if _present(entity).any()
     ]
-    rows = _rows(motion, len(shown))
+    rows = _rows(motion.step, [entity for _, entity, _ in shown])
     places = [np.column_stack([entity.x, entity.y])[_present(entity)] for _, entity, _ in shown]
     # whole metres near the first place: coordinates stay small on roads with geographic ones
     origin = np.round(places[0][0]) if places else np.zeros(2)
     scene = {
         "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME_STEP, 9),
+        "start": round(float(shown[0][1].time[0]), 3) if len(rows) else 0.0,
         "frames": len(rows),
         "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
@@ -77,7 +100,7 @@ def scene_of(
     return json.dumps(scene, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
 
 
-def _across(network: RoadNetwork, shown: Sequence[tuple[int, EntityMotion, EntityResult | None]]) -> float:
+def _across(network: RoadNetwork, shown: Sequence[tuple[int, EntityMotion, EntityResult | Remade | None]]) -> float:
     """How far the player looks to either side of the vehicle that it follows first: driving lanes, one beside its own.
 
     In m.
@@ -104,10 +127,10 @@ def packed(values: ArrayLike, resolution: float) -> dict[str, Any]:
     return {"r": resolution, "d": np.diff(whole, prepend=0).tolist()}
 
 
-def _rows(motion: Traffic, entities: int) -> RowArray:
-    count = len(motion.entities[0].time) if motion.entities else 0
-    frames = max(1, count * motion.step / FRAME_STEP * entities)
-    every = max(1, round(FRAME_STEP / motion.step)) * int(np.ceil(frames / MOST_FRAMES))
+def _rows(step: float, motions: Sequence[EntityMotion]) -> RowArray:
+    count = len(motions[0]) if motions else 0
+    frames = max(1, count * step / FRAME_STEP * len(motions))
+    every = max(1, round(FRAME_STEP / step)) * int(np.ceil(frames / MOST_FRAMES))
     return np.arange(0, count, every)
 
 
@@ -120,7 +143,7 @@ def _entity(
     network: RoadNetwork,
     number: int,
     motion: EntityMotion,
-    result: EntityResult | None,
+    result: EntityResult | Remade | None,
     rows: RowArray,
     origin: FloatArray,
 ) -> dict[str, Any]:

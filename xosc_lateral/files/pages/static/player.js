@@ -81,7 +81,7 @@
       this.marks = scene.marks.map((each) => shape(each, false));
       this.followed = this.vehicles.find((each) => each.enriched) ?? this.vehicles[0] ?? null;
       Object.assign(this, { stretch: 1, scale: 0, center: [0, 0], course: 0, playing: false, speed: 1, showGhosts: true, boxes: [] });
-      this.across = scene.across;
+      [this.across, this.start] = [scene.across, scene.start]; // its clock may be a recording's
       this.sideBySide = this.vehicles.some((each) => each.enriched);
       clock.end = Math.max(clock.end, (scene.frames - 1) * scene.step);
       this.build();
@@ -105,7 +105,7 @@
       this.playButton = button("▶", "Play (space)", () => this.toggle());
       this.scrub = on(make("input", { type: "range", min: 0, max: clock.end, step: "any", value: 0, "aria-label": "Time" }),
         "input", (bar) => clock.set(Number(bar.value)));
-      this.clockFace = make("output", { class: "time" }, "0.0 s");
+      this.clockFace = make("output", { class: "time" }, `${this.start.toFixed(1)} s`);
       const speeds = [["0.25", "¼×"], ["0.5", "½×"], ["1", "1×"], ["2", "2×"], ["4", "4×"]];
       const speed = make("select", {}, ...speeds.map(([value, text]) => make("option", { value }, text)));
       speed.value = "1";
@@ -233,7 +233,7 @@
     draw() {
       if ((window.devicePixelRatio || 1) !== this.ratio) return this.resize(); // the window moved to another screen
       if (document.activeElement !== this.scrub || this.playing) this.scrub.value = clock.time;
-      this.clockFace.textContent = `${clock.time.toFixed(1)} s`;
+      this.clockFace.textContent = `${(this.start + clock.time).toFixed(1)} s`;
       this.chips.forEach((chip, i) => chip.setAttribute("aria-pressed", String(this.vehicles[i] === this.followed)));
       const context = this.canvas.getContext("2d");
       context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
