@@ -16,7 +16,7 @@ from tests.kit.recordings import Case, road_file
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.atomic import mend, temporary_files, together, write_atomically
-from xosc_lateral.files.output_paths import claim
+from xosc_lateral.files.output_paths import claim, is_own
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 
@@ -127,7 +127,7 @@ def test_a_killed_run_leaves_the_old_output_or_the_new_one(
         assert run(state) == 0, capsys.readouterr().err
         assert content(state) == new, state
     for state in left:
-        mend([state / name for name in new])
+        mend([state / name for name in new], is_own)
         assert content(state) in (old, new), state
 
 
@@ -160,7 +160,7 @@ def test_a_profile_of_a_library_is_changed_or_as_it_was(given: Path, tmp_path: P
         if (state / "own.json").exists():
             assert run(state) == 0
         else:
-            mend([state / "night.json"])
+            mend([state / "night.json"], is_own)
         assert content(state) == new, state
     full = shutil.copytree(old, tmp_path / "full")
     assert in_child(lambda: run(full), largest=40) == 1
@@ -189,7 +189,7 @@ def test_what_others_wrote_is_not_taken_for_a_plan(tmp_path: Path) -> None:
     ):
         (tmp_path / "out" / f".o.1-0000000{number}.tmp.moves").write_text(plan)
     (tmp_path / "out" / ".o.1-00000009.tmp.moves").symlink_to(precious)
-    mend([tmp_path / "out" / "o.csv"])
+    mend([tmp_path / "out" / "o.csv"], is_own)
     assert precious.read_text() == "precious"
     assert [path.name for path in (tmp_path / "out").iterdir()] == [".o.1-00000009.tmp.moves"]
 

@@ -270,8 +270,14 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
 
 @lru_cache(maxsize=1024)
 def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    digest, size = hashlib.sha256(), 0
+    with _opened(path) as file:
+        while data := file.read(IN_MEMORY):
+            digest.update(data)
+            size += len(data)
+            if size > FILE_SIZE.bytes:
+                raise FormatError(FILE_SIZE.refusal(size / 1e6), path=path)
+    return digest.hexdigest()
 
 
 WATCH_TIME = 0.5

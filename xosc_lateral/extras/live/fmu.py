@@ -25,6 +25,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.extras.live.c_driver import c_sources, filled, identifier
 from xosc_lateral.extras.live.c_numbers import inputs_of, usual
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.output_paths import PACKAGE
 
 HOST_COMPILERS = ("cc", "gcc", "clang")
 """What is looked for where no compiler is named; the first that is there."""
@@ -193,6 +194,7 @@ def _packed(members: Mapping[str, bytes]) -> bytes:
     """A zip file, the same for the same members."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.comment = PACKAGE
         for name in sorted(members):
             archive.writestr(zipfile.ZipInfo(name), members[name], zipfile.ZIP_DEFLATED)
     return packed.getvalue()

@@ -99,7 +99,7 @@ class ManifestRow:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
-        """What `to_dict` gave, without unknown names; `ValueError` for a value that is missing or of the wrong kind."""
+        """What `to_dict` gave; `ValueError` for another name, or a value that is missing or of the wrong kind."""
         import msgspec
 
         if not isinstance(values, Mapping):
@@ -107,6 +107,8 @@ class ManifestRow:
         named = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
         if (version := named.setdefault("schema", 1)) not in range(1, SCHEMA + 1):
             raise ValueError(f"its columns are of version {version}, this program reads up to {SCHEMA}")
+        if foreign := sorted(map(str, named.keys() - {item.name for item in fields(cls)})):
+            raise ValueError(f"{foreign[0][:60]!r} is in no row of this program")
         row = msgspec.convert(named, cls)
         if any(isinstance(value, int) and abs(value) > _MAXIMUM_INTEGER for value in named.values()):
             raise ValueError("a number has more than 64 bits")

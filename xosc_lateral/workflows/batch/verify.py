@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,7 @@ from xosc_lateral.workflows.batch.jobs import Batch, Fingerprints, Job
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.result import ConversionProvenance
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 from xosc_lateral.workflows.options import declare_options, flag, process_count
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
@@ -104,6 +105,8 @@ class _Origin:
         facts = facts_in(data)
         if facts is None:
             raise FormatError("has no provenance of xosc-lateral", path=output)
+        if foreign := sorted(facts.keys() - {field.name for field in fields(ConversionProvenance)}):
+            raise FormatError(f"its provenance says {foreign[0][:60]!r}, which this program never writes", path=output)
         try:
             scenario = Path(os.path.normpath(output.parent.resolve() / str(facts["scenario"])))
             settings = ConvertSettings.of_record(facts["options"], scenario.parent)

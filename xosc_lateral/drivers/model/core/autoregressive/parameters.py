@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.limits import MODEL_ORDER
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
@@ -143,6 +144,8 @@ class Autoregression(Record, frozen=True, eq=False):
 
     def __post_init__(self) -> None:
         coefficients = frozen_array(self.coefficients)
+        if coefficients.size > MODEL_ORDER.value:
+            raise DriverProfileError(MODEL_ORDER.refusal(coefficients.size))
         if coefficients.ndim != 1 or not np.isfinite(coefficients).all() or not 0 <= self.scale < np.inf:
             raise DriverProfileError(f"autoregression: {coefficients.tolist()}, scale {self.scale}")
         root = largest_root(coefficients)
