@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import shutil
 import sys
@@ -192,6 +193,29 @@ def test_what_others_wrote_is_not_taken_for_a_plan(tmp_path: Path) -> None:
     mend([tmp_path / "out" / "o.csv"], is_own)
     assert precious.read_text() == "precious"
     assert [path.name for path in (tmp_path / "out").iterdir()] == [".o.1-00000009.tmp.moves"]
+
+
+def test_a_planted_plan_touches_nothing_but_own_outputs_of_the_command(tmp_path: Path) -> None:
+    """Neither a user's file, nor the input, nor an output of another command; one that was ours is written anew."""
+    assert main(["template", "write", "cut-in", "-o", str(tmp_path)]) == 0
+    (tmp_path / "notes").mkdir()
+    users = [tmp_path / name for name in ("thesis.docx", "out.xosc", "notes/n.xosc", "own.xosc")]
+    for path in users:
+        path.write_text("mine")
+        (path.parent / f".{path.stem}.zz-aaaaaaaa.tmp{path.suffix}").write_text("planted")
+    names = {os.path.relpath(path, tmp_path): f".{path.stem}.zz-aaaaaaaa.tmp{path.suffix}" for path in users}
+    plans = ({**names, "cut-in.xodr": None}, [[[]]], {"out.xosc": 3}, {"out.xosc\0": "x"}, {"out.xosc": "\0"})
+    texts = (*map(json.dumps, plans), "[" * 100_000, '{"out.xosc": ' * 50_000)
+    for number, text in enumerate(texts):
+        (tmp_path / f".out.zz-aaaaaaa{number}.tmp.moves").write_text(text)
+    before = {path: path.read_bytes() for path in (*users, tmp_path / "cut-in.xodr", tmp_path / "cut-in.xosc")}
+    words = ["convert", str(tmp_path / "cut-in.xosc"), "-o", str(tmp_path / "out.xosc"), "--time-limit", "2"]
+    assert main(words) == 1
+    assert {path: path.read_bytes() for path in before} == before
+    assert main([*words, "--force"]) == 0
+    assert b"planted" not in (tmp_path / "out.xosc").read_bytes()
+    del before[tmp_path / "out.xosc"]
+    assert {path: path.read_bytes() for path in before} == before
 
 
 def test_of_files_that_fail_together_none_appears(tmp_path: Path) -> None:

@@ -126,7 +126,8 @@ def _storage(url: str) -> Iterator[tuple[Any, str]]:
     """The file system that an address is of, and what it calls the place. Raises `FormatError` for all that it does."""
     scheme = url.partition("://")[0]
     if scheme.lower() not in SCHEMES or "::" in url:  # which chains file systems: each may be one that runs programs
-        raise FormatError(f"{scheme}:// is not read; {', '.join(SCHEMES)} are", path=url)
+        what = "a chain of storages" if "::" in url else f"{scheme}://"
+        raise FormatError(f"{what} is not read; {', '.join(SCHEMES)} are", path=url)
     try:
         url_to_fs = import_module("fsspec.core").url_to_fs
     except ImportError as error:

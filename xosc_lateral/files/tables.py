@@ -272,7 +272,7 @@ _SHARED = re.compile(r"\b(dictionary<|\w+_view\b|run_end_encoded<|\w+_union<)") 
 
 @apart
 def read_arrow(path: Path, columns: Sequence[str] | None = None, otherwise: str = "") -> Any:
-    """A Parquet or Feather file, or some columns of it, as an Arrow table, each cell of which has memory of its own.
+    """A Parquet or Feather file, or some columns of it, as an Arrow table.
 
     Raises `FormatError`: it is none, or beyond `limits`; `otherwise`: what it is not where it lacks a column.
     """
@@ -301,17 +301,17 @@ def _refuse_size(rows: int, columns: int, source: Source) -> None:
 
 
 def _of_cells(table: Any, source: Source) -> Any:
-    """An Arrow table without codes for cells, within limits as it then is: a million equal texts are one in a file."""
+    """An Arrow table, if it is within limits with a cell of its own for every code: texts in a file are there once."""
     _refuse_size(table.num_rows, table.num_columns, source)
     table.validate(full=True)
-    for number, name in enumerate(table.column_names):
-        kind = table.schema.types[number]
-        if str(kind).startswith("dictionary<"):
-            kind = kind.value_type
-            table = table.set_column(number, name, table[number].cast(kind))
-        if _SHARED.search(str(kind)):
+    size = 0
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        is_coded = str(column.type).startswith("dictionary<")
+        cells = column.cast(column.type.value_type) if is_coded else column
+        if _SHARED.search(str(cells.type)):
             raise FormatError("cells of this kind are not read", path=source.path, element=f"column {name!r}")
-    source.unpacked(table.nbytes)
+        size += cells.nbytes
+    source.unpacked(size)
     return table
 
 
