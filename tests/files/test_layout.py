@@ -84,7 +84,7 @@ def test_cells_count_as_they_are_in_memory(name: str, is_held: bool, tmp_path: P
     else:
         feather.write_feather(BOMBS[name], str(path), compression="zstd", chunksize=10**9)
     assert path.stat().st_size < 2_000_000
-    with pytest.raises(XoscLateralError, match="unpacked bytes per byte|memory|of this kind are not read"):
+    with pytest.raises(XoscLateralError, match=r"unpacked bytes per byte|memory|of this kind are not read"):
         given_drives(path.read_bytes() if is_held else path)
 
 
