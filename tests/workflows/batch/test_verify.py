@@ -280,3 +280,21 @@ def test_what_is_stale_is_made_anew_with_its_reason_and_kept_if_asked(copy: Path
     assert totals(mode="trajectory") == (8, {"settings differ": 8}, {}, 0)
     next((copy / "out" / "3").glob("*.xosc")).unlink()
     assert totals(mode="trajectory", keep_old=True) == (1, {"changed or gone": 1}, {}, 7), "that is not old but lost"
+
+
+def test_profiles_and_inputs_are_compared_by_their_hashes(copy: Path) -> None:
+    """Of a profile the output's own statement, of inputs the manifest's."""
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    text = output.read_text("utf-8")
+    names = json.loads(re.findall("provenance: (.*?) -->", text)[0])["profiles"]
+    for name in names:
+        forged = tampered(text, lambda facts, name=name: facts["profiles"][name].__setitem__(1, "0" * 64))
+        output.write_text(forged, encoding="utf-8")
+        assert named(xl.verify(output, fast=True)) == {output.name: ["profile"]}
+    output.write_text(text, encoding="utf-8")
+    rows = pd.read_parquet(copy / "out" / MANIFEST)
+    below = output.relative_to(copy / "out").as_posix()
+    rows.loc[rows.output == below, "inputs"] = rows.inputs[rows.output == below].map(lambda one: one.replace("a", "b"))
+    rows.to_parquet(copy / "out" / MANIFEST)
+    (failing,) = xl.verify(copy / "out", fast=True).failing
+    assert failing.output == output and failing.problems[0][1] == "the manifest states another inputs"
