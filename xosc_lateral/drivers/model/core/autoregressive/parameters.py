@@ -11,7 +11,8 @@ References
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from math import isfinite
+from math import fsum, isfinite, sqrt
+from operator import mul
 from typing import Annotated
 
 import msgspec
@@ -23,7 +24,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import MODEL_ORDER
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.resampling import STEP, in_digits
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
 from xosc_lateral.drivers.model.linear_filters import JitKernel, worth_compiling
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
@@ -263,8 +264,22 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         covariance = self.coarse.covariance(order)
         if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
             return np.zeros((order, order))
-        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
-        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
+        covariance = in_digits(covariance)  # the same on every processor
+        covariance[0] *= 1.0 + 1e-9
+        return _triangle(covariance.tolist())
+
+
+def _triangle(covariance: list[float]) -> FloatArray:
+    """Cholesky's factor of a covariance that depends on the lag, shape (n,) -> (n, n); libraries add up in other orders
+    on other processors, and what is exported is the same bytes on all.
+    """
+    rows: list[list[float]] = []
+    for k in range(len(covariance)):
+        rows.append([])
+        for j, above in enumerate(rows):
+            rest = covariance[k - j] - fsum(map(mul, rows[k], above[:j]))
+            rows[k].append(sqrt(rest) if j == k else rest / above[j])
+    return np.array([row + [0.0] * (len(covariance) - len(row)) for row in rows])
 
 
 CANDIDATES = 64
