@@ -27,8 +27,7 @@ LONGEST_LINE = 2000  # of a message [characters]
 
 def cut(text: str) -> str:
     """Text without the middle of what is too long for a message: a file may hold a million letters for a number."""
-    half = LONGEST_LINE // 2
-    return text if len(text) <= LONGEST_LINE else f"{text[:half]} ... {text[-half:]}"
+    return text if len(text) <= LONGEST_LINE else f"{text[: LONGEST_LINE // 2]} ... {text[-LONGEST_LINE // 2 :]}"
 
 
 def by_owner(text: str) -> str:

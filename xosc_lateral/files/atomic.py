@@ -147,6 +147,8 @@ def _temporary_beside(path: Path, suffix: str) -> Iterator[Path]:
     temporary = path.with_name(name)
     descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
+        with contextlib.suppress(OSError):  # what others may not read stays so
+            temporary.chmod(stat.S_IMODE(path.stat().st_mode))
         if sys.platform != "win32":  # where a lock keeps the writer itself out
             with contextlib.suppress(OSError):
                 lock(descriptor)

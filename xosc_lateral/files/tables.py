@@ -35,7 +35,6 @@ MOST_LINES = 500  # of a text, that show whether ids begin with 0
 ID_HEADER = re.compile("(id|vin|drive|vehicle|trip|track|session|ride|case)$")
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
-LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 _CHUNK = 1 << 20
 PART_ROWS = 500_000  # of a text are in memory as cells [-]
 
@@ -165,7 +164,7 @@ _READERS = {"pandas", "pyarrow", "gzip", "zlib"}  # whose own texts say nothing 
 
 def _plain_reason(error: Exception) -> str:
     """What a library says about a file, in words that need no knowledge of the library."""
-    reason = " ".join(str(error).split())[:LONGEST_MESSAGE]
+    reason = " ".join(str(error).split())[:300]
     if match := _FIELDS.search(reason):
         return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
     if match := _OPEN_QUOTE.search(reason):
@@ -306,8 +305,7 @@ def _of_cells(table: Any, source: Source) -> Any:
     table.validate(full=True)
     size = 0
     for name, column in zip(table.column_names, table.columns, strict=True):
-        is_coded = str(column.type).startswith("dictionary<")
-        cells = column.cast(column.type.value_type) if is_coded else column
+        cells = column.cast(column.type.value_type) if str(column.type)[:11] == "dictionary<" else column
         if _SHARED.search(str(cells.type)):
             raise FormatError("cells of this kind are not read", path=source.path, element=f"column {name!r}")
         size += cells.nbytes

@@ -69,8 +69,8 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
     if document_type is not None and any(True for _ in document_type.entities()):
         raise FormatError("entity declarations are not allowed", path=path, element="DOCTYPE")
     if crowded := cast("list[etree._Element]", _CROWDED(root)):
-        what = XML_ATTRIBUTES.refusal(len(crowded[0].keys()))
-        raise FormatError(what, path=path, line=line_of(crowded[0]), element=crowded[0].tag[:60])
+        one = crowded[0]
+        raise FormatError(XML_ATTRIBUTES.refusal(len(one.keys())), path=path, line=line_of(one), element=one.tag[:60])
     return root
 
 

@@ -35,6 +35,7 @@ from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.extras.live.c_driver import c_sources, export_c
 from xosc_lateral.extras.live.c_numbers import numbers_of
+from xosc_lateral.extras.live.fmu import export_fmu
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.profiles import read_profile, write_profile
 
@@ -399,3 +400,12 @@ def test_nobody_is_led_beyond_one_and_a_half_lanes(push: float, most: float, tmp
         largest = float(np.max(np.sign(push) * np.array(offsets)))
         assert largest < most + 1e-9
         assert largest > 0.9 * abs(push) or abs(push) > most
+
+
+@pytest.mark.parametrize("name", ["offset", "rate", "heading", "seed", "fault", "position", "following"])
+def test_a_column_called_as_a_variable_of_all_units_is_refused(name: str, tmp_path: Path) -> None:
+    effect = Linear(acts=Acts.LOCATION, column=name, coefficients=(0.1,), errors=(0.1,), reference=(0.0,))
+    profile = replace(read_profile("motorway"), effects=(effect,))
+    with pytest.raises(DriverProfileError, match=f"a column is called '{name}'"):
+        export_fmu(profile, tmp_path / "d.fmu", compilers=())
+    assert not list(tmp_path.iterdir())

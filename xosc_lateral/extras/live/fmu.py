@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.errors import DriverProfileError, SimulationError
 from xosc_lateral.base.limits import DISTANCES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
@@ -136,6 +136,9 @@ def _description(profile: DriverProfile, version: str, token: str) -> Element:
     if is_2:
         _list_sources(SubElement(simulation, "SourceFiles"), "File", name)
     listed = variables_of(profile)
+    names = ["time", *(variable.name for variable in listed)]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise DriverProfileError(f"profile {profile.name}: a column is called {twice[0]!r}, as a variable of all units")
     add_units(root, {variable.unit for variable in listed if variable.unit is not None})
     logged = SubElement(root, "LogCategories")
     for category in ("logStatusWarning", "logStatusError"):
