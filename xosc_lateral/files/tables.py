@@ -34,6 +34,7 @@ ARROW = (PARQUET, *FEATHER)
 MOST_LINES = 500  # of a text, that show whether ids begin with 0
 ID_HEADER = re.compile("(id|vin|drive|vehicle|trip|track|session|ride|case)$")
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
+LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
 TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 _CHUNK = 1 << 20
 PART_ROWS = 500_000  # of a text are in memory as cells [-]
@@ -164,7 +165,7 @@ _READERS = {"pandas", "pyarrow", "gzip", "zlib"}  # whose own texts say nothing 
 
 def _plain_reason(error: Exception) -> str:
     """What a library says about a file, in words that need no knowledge of the library."""
-    reason = " ".join(str(error).split())[:300]
+    reason = " ".join(str(error).split())[:LONGEST_MESSAGE]
     if match := _FIELDS.search(reason):
         return f"line {match[2]} has {match[3]} cells, the head has {match[1]}"
     if match := _OPEN_QUOTE.search(reason):
