@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import SMALL_PARSER_MEMORY
+from xosc_lateral.base.memory import address_space
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import check_regular
 from xosc_lateral.files.tables import foreign_errors
@@ -215,5 +217,9 @@ def _read_table(path: Path) -> Iterator[dict[str, Any]]:
 
     check_regular(path)
     with foreign_errors(path, "can't be read as Parquet"), pq.ParquetFile(path) as file:
-        for batch in file.iter_batches(ROW_GROUP):
-            yield from batch.to_pylist()
+        batches = file.iter_batches(ROW_GROUP)
+        while True:
+            with address_space(SMALL_PARSER_MEMORY.value):
+                if not (rows := next((batch.to_pylist() for batch in batches), [])):
+                    return
+            yield from rows
