@@ -24,7 +24,7 @@ from xosc_lateral.base.limits import (
     SMALL_PARSER_MEMORY,
 )
 from xosc_lateral.files import source
-from xosc_lateral.files.held import Held, held_at, kept
+from xosc_lateral.files.held import Held, held_at, hold_again
 
 REFUSED_MODULES = ("sympy",)
 """Packages that make code of texts; asammdf hands formulas to it where it is installed."""
@@ -73,7 +73,7 @@ def _read(
     module: str, name: str, args: tuple[Any, ...], keywords: dict[str, Any], held: Held | None
 ) -> tuple[Any, dict[Any, str]]:
     """What a function gives there, and the files that it parsed, with their hashes; `held`: files in memory."""
-    before, _held = dict(source.parsed_files()), held and kept(held)
+    before, _held = dict(source.parsed_files()), held and hold_again(held)
     made = getattr(import_module(module), name)(*args, **keywords)
     return made, {path: digest for path, digest in source.parsed_files().items() if before.get(path) != digest}
 

@@ -32,10 +32,10 @@ class Held:
 
 def hold(files: Mapping[str, bytes]) -> Held:
     """Hold files until nobody has the result any more."""
-    return kept(Held(files))
+    return hold_again(Held(files))
 
 
-def kept(held: Held) -> Held:
+def hold_again(held: Held) -> Held:
     """Hold what another process, or nobody yet, holds."""
     return _HELD.setdefault(held.name, held)
 
