@@ -24,7 +24,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import MODEL_ORDER
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
-from xosc_lateral.drivers.drives.resampling import STEP, in_digits
+from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
 from xosc_lateral.drivers.model.linear_filters import JitKernel, worth_compiling
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once
@@ -162,7 +162,7 @@ class Autoregression(Record, frozen=True, eq=False):
     def power(self, frequency: FloatArray) -> FloatArray:
         """Spectral density at frequencies [cycles per step], shape (n,), 0 to 0.5; white noise of variance 1 has 1."""
         turns = _turns_on_grid(self.order) if frequency is FREQUENCIES else _turns(frequency, self.order)
-        gain = 1.0 - turns @ self.coefficients
+        gain = 1.0 - np.einsum("ij,j->i", turns, self.coefficients)  # BLAS adds up otherwise on other processors
         return np.asarray(self.scale**2 / np.abs(gain) ** 2)
 
     def covariance(self, n_lags: int) -> FloatArray:
@@ -264,7 +264,6 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         covariance = self.coarse.covariance(order)
         if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
             return np.zeros((order, order))
-        covariance = in_digits(covariance)  # the same on every processor
         covariance[0] *= 1.0 + 1e-9
         return _triangle(covariance.tolist())
 
