@@ -69,8 +69,10 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
     if document_type is not None and any(True for _ in document_type.entities()):
         raise FormatError("entity declarations are not allowed", path=path, element="DOCTYPE")
     if crowded := cast("list[etree._Element]", _CROWDED(root)):
-        one = crowded[0]
-        raise FormatError(XML_ATTRIBUTES.refusal(len(one.keys())), path=path, line=line_of(one), element=one.tag[:60])
+        element = crowded[0]
+        raise FormatError(
+            XML_ATTRIBUTES.refusal(len(element.keys())), path=path, line=line_of(element), element=element.tag
+        )
     return root
 
 

@@ -220,6 +220,7 @@ def _read_table(path: Path) -> Iterator[dict[str, Any]]:
         batches = file.iter_batches(ROW_GROUP)
         while True:
             with address_space(SMALL_PARSER_MEMORY.value):
-                if not (rows := next((batch.to_pylist() for batch in batches), [])):
-                    return
+                rows = next((batch.to_pylist() for batch in batches), None)
+            if rows is None:
+                return
             yield from rows
