@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import replace_atomically, write_atomically
-from xosc_lateral.files.output_paths import refuse_outputs
+from xosc_lateral.files.output_paths import claim, refuse_outputs
 
 
 def test_text_and_bytes_arrive(tmp_path: Path) -> None:
@@ -74,3 +75,13 @@ def test_an_output_whose_folder_can_not_be_made_is_refused(tmp_path: Path, monke
     monkeypatch.setattr("os.access", lambda *_: False)  # permissions don't bind the user that runs many a test
     with pytest.raises(FormatError, match="no permission to write to"):
         refuse_outputs([tmp_path / "out.html"])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX modes")
+def test_an_output_keeps_its_mode_and_a_pipe_is_none(tmp_path: Path) -> None:
+    secret = write_atomically(tmp_path / "a.json", "{}")
+    secret.chmod(0o600)
+    assert write_atomically(secret, "[]").stat().st_mode & 0o777 == 0o600
+    os.mkfifo(tmp_path / "pipe.json")
+    with pytest.raises(FormatError, match="is a fifo, not a file"):
+        claim([tmp_path / "pipe.json"], force=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +63,36 @@ def test_packed_tables_and_tables_in_parts(tmp_path: Path) -> None:
     assert [len(drive) for drive in read_drives([tmp_path / "a.csv.zst", tmp_path / "a.feather"])] == [400, 400]
     assert [(drive.name, len(drive)) for drive in read_drives(tmp_path / "parts")] == [("0", 200), ("1", 200)]
     assert len(given_drives(tmp_path / "parts").inputs["parts"]) == 64
+
+
+ZEROS, LONG = np.zeros(6_000_000), pa.array(["x" * 1_000_000])
+BOMBS = {
+    "zeros.feather": pa.table(dict.fromkeys(TABLE, ZEROS)),
+    "one text.parquet": pa.table({"note": pa.DictionaryArray.from_arrays(np.zeros(3000, np.int32), LONG)}),
+    "one text.arrow": pa.table({"note": pa.DictionaryArray.from_arrays(np.zeros(3000, np.int32), LONG)}),
+    "views.arrow": pa.table({"note": pa.array(["x" * 1000] * 3000, pa.string_view())}),
+    "nulls.feather": pa.table({"note": pa.nulls(200_000_000)}),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+@pytest.mark.parametrize("is_held", [False, True])
+def test_cells_count_as_they_are_in_memory(name: str, is_held: bool, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if path.suffix == ".parquet":
+        pq.write_table(BOMBS[name], path, compression="zstd")
+    else:
+        feather.write_feather(BOMBS[name], str(path), compression="zstd", chunksize=10**9)
+    assert path.stat().st_size < 2_000_000
+    with pytest.raises(XoscLateralError, match=r"unpacked bytes per byte|memory|of this kind are not read"):
+        given_drives(path.read_bytes() if is_held else path)
+
+
+@pytest.mark.parametrize("write", [TABLE.to_parquet, TABLE.to_feather])
+def test_bytes_in_memory_are_a_table_as_in_a_file(write: Callable[[io.BytesIO], None]) -> None:
+    held = io.BytesIO()
+    write(held)
+    assert [len(drive) for drive in given_drives(held.getvalue()).drives] == [400]
 
 
 @pytest.mark.parametrize("kind", ["arrow", "dict", "times in the index", "lazy"])

@@ -166,3 +166,16 @@ def test_canonical_json_is_plain_json() -> None:
 def test_a_name_that_no_file_can_have_is_unknown():
     with pytest.raises(DriverProfileError, match="no profile has a name of 5000 characters"):
         read_profile("a" * 5000)
+
+
+@pytest.mark.parametrize(("order", "is_read"), [(200, True), (201, False), (40_000, False)])
+def test_the_order_of_a_model_is_limited(order: int, is_read: bool, tmp_path: Path) -> None:
+    values = json.loads(find_profile("motorway-vehicle-1").read_text("utf-8"))
+    values["model"]["coarse"]["coefficients"] = [0.5 / order] * order
+    path = tmp_path / "p.json"
+    path.write_text(json.dumps(values))
+    if is_read:
+        assert read_profile(path).model.coarse.order == order
+        return
+    with pytest.raises(FormatError, match=f"coefficients of an autoregression: {order}, at most 200"):
+        read_profile(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import shutil
 import sys
@@ -16,7 +17,7 @@ from tests.kit.recordings import Case, road_file
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.atomic import mend, temporary_files, together, write_atomically
-from xosc_lateral.files.output_paths import claim
+from xosc_lateral.files.output_paths import claim, is_own
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 
@@ -127,7 +128,7 @@ def test_a_killed_run_leaves_the_old_output_or_the_new_one(
         assert run(state) == 0, capsys.readouterr().err
         assert content(state) == new, state
     for state in left:
-        mend([state / name for name in new])
+        mend([state / name for name in new], is_own)
         assert content(state) in (old, new), state
 
 
@@ -160,7 +161,7 @@ def test_a_profile_of_a_library_is_changed_or_as_it_was(given: Path, tmp_path: P
         if (state / "own.json").exists():
             assert run(state) == 0
         else:
-            mend([state / "night.json"])
+            mend([state / "night.json"], is_own)
         assert content(state) == new, state
     full = shutil.copytree(old, tmp_path / "full")
     assert in_child(lambda: run(full), largest=40) == 1
@@ -189,9 +190,32 @@ def test_what_others_wrote_is_not_taken_for_a_plan(tmp_path: Path) -> None:
     ):
         (tmp_path / "out" / f".o.1-0000000{number}.tmp.moves").write_text(plan)
     (tmp_path / "out" / ".o.1-00000009.tmp.moves").symlink_to(precious)
-    mend([tmp_path / "out" / "o.csv"])
+    mend([tmp_path / "out" / "o.csv"], is_own)
     assert precious.read_text() == "precious"
     assert [path.name for path in (tmp_path / "out").iterdir()] == [".o.1-00000009.tmp.moves"]
+
+
+def test_a_planted_plan_touches_nothing_but_own_outputs_of_the_command(tmp_path: Path) -> None:
+    """Neither a user's file, nor the input, nor an output of another command; one that was ours is written anew."""
+    assert main(["template", "write", "cut-in", "-o", str(tmp_path)]) == 0
+    (tmp_path / "notes").mkdir()
+    users = [tmp_path / name for name in ("thesis.docx", "out.xosc", "notes/n.xosc", "own.xosc")]
+    for path in users:
+        path.write_text("mine")
+        (path.parent / f".{path.stem}.zz-aaaaaaaa.tmp{path.suffix}").write_text("planted")
+    names = {os.path.relpath(path, tmp_path): f".{path.stem}.zz-aaaaaaaa.tmp{path.suffix}" for path in users}
+    plans = ({**names, "cut-in.xodr": None}, [[[]]], {"out.xosc": 3}, {"out.xosc\0": "x"}, {"out.xosc": "\0"})
+    texts = (*map(json.dumps, plans), "[" * 100_000, '{"out.xosc": ' * 50_000)
+    for number, text in enumerate(texts):
+        (tmp_path / f".out.zz-aaaaaaa{number}.tmp.moves").write_text(text)
+    before = {path: path.read_bytes() for path in (*users, tmp_path / "cut-in.xodr", tmp_path / "cut-in.xosc")}
+    words = ["convert", str(tmp_path / "cut-in.xosc"), "-o", str(tmp_path / "out.xosc"), "--time-limit", "2"]
+    assert main(words) == 1
+    assert {path: path.read_bytes() for path in before} == before
+    assert main([*words, "--force"]) == 0
+    assert b"planted" not in (tmp_path / "out.xosc").read_bytes()
+    del before[tmp_path / "out.xosc"]
+    assert {path: path.read_bytes() for path in before} == before
 
 
 def test_of_files_that_fail_together_none_appears(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -60,3 +61,14 @@ def test_small_files_are_parsed_once(tmp_path: Path) -> None:
     assert read_xml(path)[0] is read_xml(path)[0]
     path.write_text("<bb/>")
     assert read_xml(path)[0].tag == "bb"
+
+
+def test_an_element_of_a_million_attributes_and_a_name_of_a_million_letters_cost_a_second() -> None:
+    crowded = b"<r>" + b"<a" + b"".join(b' a%d="True"' % number for number in range(100_000)) + b"/></r>"
+    with pytest.raises(FormatError, match=r"f\.xosc:1: a: attributes of an XML element: 100000, at most 1000"):
+        parse_xml(crowded, "f.xosc")
+    assert len(parse_xml(b"<a" + b"".join(b' a%d="1"' % number for number in range(1000)) + b"/>", "f").keys()) == 1000
+    begin = time.perf_counter()
+    text = str(FormatError(f"{'x' * 10**6!r} is not a number", path="/" + "p" * 120_000 + ".xosc"))
+    assert time.perf_counter() - begin < 1.0
+    assert len(text) < 3000 and text.endswith("is not a number")

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 MEMORY_FOLDER = re.compile(r"/in-memory-[0-9a-f]{16}/(?:up/)*")
 """Of files that a caller holds (`files.held`): he knows them by the names that come after it."""
-COPIES = re.compile(r"\S*[/\\]xosc-lateral-\w{8}[/\\]elsewhere[/\\]([a-zA-Z][a-zA-Z0-9+.-]+)[/\\]")
+COPIES = re.compile(r"(?<!\S)\S*[/\\]xosc-lateral-\w{8}[/\\]elsewhere[/\\]([a-zA-Z][a-zA-Z0-9+.-]+)[/\\]")
 """Before the place of what lies elsewhere in its storage, of which this is a copy (`files.remote`)."""
 
 
@@ -19,7 +19,15 @@ class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
 
     def __str__(self) -> str:
-        return printable(by_owner(super().__str__()))
+        return printable(by_owner(cut(super().__str__())))
+
+
+LONGEST_LINE = 2000  # of a message [characters]
+
+
+def cut(text: str) -> str:
+    """Text without the middle of what is too long for a message: a file may hold a million letters for a number."""
+    return text if len(text) <= LONGEST_LINE else f"{text[: LONGEST_LINE // 2]} ... {text[-LONGEST_LINE // 2 :]}"
 
 
 def by_owner(text: str) -> str:
@@ -40,8 +48,8 @@ class FormatError(XoscLateralError, ValueError):
     """What is wrong with a file, with value and what to do; `element`: XML element or column (``Event 'brake'``)."""
 
     def __init__(self, what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> None:
-        self.what, self.path, self.line, self.element = what, path, line, element
-        super().__init__(" ".join(locate(what, path=path, line=line, element=element).split()))
+        self.what, self.path, self.line, self.element = cut(what), path, line, element
+        super().__init__(" ".join(locate(self.what, path=path, line=line, element=element).split()))
 
 
 class MissingFileError(FormatError):

@@ -45,11 +45,13 @@ UNPACKED_UNASKED = Limit(100, "MB", "unpacked size that needs no such ratio", "t
 UNPACKED_SIZE = Limit(4000, "MB", "unpacked size of a gz, zip or Parquet file", "as for a file that is not packed")
 TABLE_CELLS = Limit(250e6, "", "cells of a table", "2 GB as doubles: 24 h at 50 Hz with 57 columns")
 TABLE_COLUMNS = Limit(2000, "", "columns of a table", "bus logs have hundreds; beyond, it is transposed")
-PROFILE_SIZE = Limit(50, "MB", "size of a driver profile", "fitted ones have less than 1 MB")
+PROFILE_SIZE = Limit(5, "MB", "size of a driver profile", "fitted ones have less than 1 MB")
+MODEL_ORDER = Limit(200, "", "coefficients of an autoregression", "fitted ones have 16, which is 16 s of memory")
 RESPONSE = Limit(600, "s", "lag, preview or response time of an effect", "drivers look seconds ahead and tire in hours")
 COURSE = Limit(100, "", "shifts in time of an effect's course", "fitted ones have three; each costs a row per step")
 JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
 XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
+XML_ATTRIBUTES = Limit(1000, "", "attributes of an XML element", "the standards' have ten; reading all is quadratic")
 
 TIME = Limit(1e10, "s", "time stamp", "seconds since 1970 until the year 2286; beyond, doubles lose microseconds")
 DRIVE_SPAN = Limit(2.7e6, "s", "time that one drive covers", "a month; 13.5 million model steps")
@@ -76,6 +78,7 @@ REPEATED_RUNS = Limit(
 PARSER_TIME = Limit(120, "s", "time that a library may read a file for", "a small one takes a second")
 PARSER_TIME_PER_SIZE = Limit(4, "s", "more for each MB of the file", "a trace of OSI takes up to one")
 PARSER_MEMORY = Limit(4000, "MB", "memory to read a file with, and three times its size", "as for one scenario")
+SMALL_PARSER_MEMORY = Limit(1000, "MB", "of it whatever the size, and 200 times that", "libraries load in 500 MB")
 
 LIVE_PAUSE = Limit(60, "s", "time between two steps of a running simulation", "300 steps of a driver: a second or two")
 LIVE_LINE = Limit(100, "MB", "a line of live stdio", "100 000 vehicles; one that sends no end of line fills any memory")

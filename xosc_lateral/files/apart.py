@@ -16,8 +16,15 @@ from typing import Any, ParamSpec, TypeVar
 
 from xosc_lateral.base import process
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.limits import PARSER_MEMORY, PARSER_TIME, PARSER_TIME_PER_SIZE
+from xosc_lateral.base.limits import (
+    PACKING_RATIO,
+    PARSER_MEMORY,
+    PARSER_TIME,
+    PARSER_TIME_PER_SIZE,
+    SMALL_PARSER_MEMORY,
+)
 from xosc_lateral.files import source
+from xosc_lateral.files.held import Held, held_at, hold_again
 
 REFUSED_MODULES = ("sympy",)
 """Packages that make code of texts; asammdf hands formulas to it where it is installed."""
@@ -45,8 +52,9 @@ def apart(read: Callable[P, Made]) -> Callable[P, Made]:
             return read(*args, **keywords)
         path = Path(str(args[0]))
         megabytes = source.check_regular(path).st_size / 1e6
-        seconds, memory = PARSER_TIME.value + PARSER_TIME_PER_SIZE.value * megabytes, PARSER_MEMORY.value
-        named = (read.__module__, read.__qualname__, args, keywords)
+        seconds = PARSER_TIME.value + PARSER_TIME_PER_SIZE.value * megabytes
+        memory = min(PARSER_MEMORY.value, SMALL_PARSER_MEMORY.value + PACKING_RATIO.value * megabytes)
+        named = (read.__module__, read.__qualname__, args, keywords, held_at(path))
         try:
             made, parsed = _readers.call(_read, *named, seconds=seconds, megabytes=memory + 3.0 * megabytes)
         except MemoryError as error:
@@ -61,9 +69,11 @@ def apart(read: Callable[P, Made]) -> Callable[P, Made]:
     return call
 
 
-def _read(module: str, name: str, args: tuple[Any, ...], keywords: dict[str, Any]) -> tuple[Any, dict[Any, str]]:
-    """What a function gives there, and the files that it parsed, with their hashes."""
-    before = dict(source.parsed_files())
+def _read(
+    module: str, name: str, args: tuple[Any, ...], keywords: dict[str, Any], held: Held | None
+) -> tuple[Any, dict[Any, str]]:
+    """What a function gives there, and the files that it parsed, with their hashes; `held`: files in memory."""
+    before, _held = dict(source.parsed_files()), held and hold_again(held)
     made = getattr(import_module(module), name)(*args, **keywords)
     return made, {path: digest for path, digest in source.parsed_files().items() if before.get(path) != digest}
 

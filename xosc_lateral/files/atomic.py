@@ -11,7 +11,7 @@ import secrets
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -73,8 +73,8 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     return path
 
 
-Staged = Mapping[Path, Path | None]  # Output and the temporary file that becomes it; None: it is removed.
-_STAGED: ContextVar[tuple[dict[Path, Path | None], ExitStack] | None] = ContextVar("staged", default=None)
+Staged = Mapping[Path, Path]  # Output and the temporary file that becomes it.
+_STAGED: ContextVar[tuple[dict[Path, Path], ExitStack] | None] = ContextVar("staged", default=None)
 
 
 @contextmanager
@@ -88,7 +88,7 @@ def together() -> Iterator[None]:
         yield
         return
     with ExitStack() as kept:
-        staged: dict[Path, Path | None] = {}
+        staged: dict[Path, Path] = {}
         token = _STAGED.set((staged, kept))
         try:
             yield
@@ -97,16 +97,9 @@ def together() -> Iterator[None]:
         first = next(iter(staged), None)
         if first is not None and len(staged) > 1:
             with _naming(first):
-                plan = {os.path.relpath(path, first.parent): one and one.name for path, one in staged.items()}
+                plan = {os.path.relpath(path, first.parent): one.name for path, one in staged.items()}
                 kept.enter_context(_temporary_beside(first, _PLAN)).write_text(json.dumps(plan), "utf-8")
         _move(staged)
-
-
-def remove_together(path: Path) -> None:
-    """Within `together`, a file beside its outputs goes when they appear."""
-    staged = _STAGED.get()
-    assert staged is not None
-    staged[0][path] = None
 
 
 @contextmanager
@@ -124,20 +117,13 @@ def _move(staged: Staged) -> None:
     try:
         for path, temporary in staged.items():
             with _naming(path):
-                _put(path, temporary)
-            LOG.info("wrote %s" if temporary else "removed %s", path)
+                temporary.replace(path)
+            LOG.info("wrote %s", path)
     except BaseException:
         for path, temporary in staged.items():
             with contextlib.suppress(OSError):
-                _put(path, temporary)
+                temporary.replace(path)
         raise
-
-
-def _put(path: Path, temporary: Path | None) -> None:
-    if temporary is None:
-        path.unlink(missing_ok=True)
-    else:
-        temporary.replace(path)
 
 
 @contextmanager
@@ -161,6 +147,8 @@ def _temporary_beside(path: Path, suffix: str) -> Iterator[Path]:
     temporary = path.with_name(name)
     descriptor = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
+        with contextlib.suppress(OSError):  # what others may not read stays so
+            temporary.chmod(stat.S_IMODE(path.stat().st_mode))
         if sys.platform != "win32":  # where a lock keeps the writer itself out
             with contextlib.suppress(OSError):
                 lock(descriptor)
@@ -191,41 +179,41 @@ def lock(descriptor: int) -> bool:
     return True
 
 
-def mend(outputs: Iterable[Path]) -> None:
+LARGEST_PLAN = 1_000_000  # of what says which temporary files are moved where [byte]
+
+
+def mend(outputs: Iterable[Path], is_own: Callable[[Path], bool]) -> None:
     """Finish what killed runs were moving to these places, and remove what they had only begun to write.
 
+    What is found may be anybody's: no other file than these outputs is replaced, nor one that is not ours (`is_own`).
     Files of a run that is at work are locked, and stay; so do links, and files of other users.
     """
-    begun = temporary_files()
+    begun, wanted = temporary_files(), {Path(os.path.normpath(output.absolute())) for output in outputs}
     stems: dict[Path, set[str]] = {}
-    for output in outputs:
+    for output in wanted:
         stems.setdefault(output.parent, set()).update((output.stem[:_STEM], output.name[:_STEM]))
-    for folder, wanted in stems.items():
+    for folder, named in stems.items():
         matches = {path: begun.fullmatch(path.name) for path in folder.glob(".*.tmp*")}
-        mine = [path for path, match in matches.items() if match is not None and match[1] in wanted]
+        mine = [path for path, match in matches.items() if match is not None and match[1] in named]
         for path in sorted(mine, key=lambda path: path.suffix != _PLAN):
             with contextlib.suppress(OSError, FormatError), open_own(path, flags=0) as file:
                 if sys.platform == "win32" or not lock(file.fileno()):
                     continue
                 if path.suffix == _PLAN:
-                    with contextlib.suppress(
-                        ValueError, AttributeError, TypeError
-                    ):  # half of a plan: nothing was moved
-                        _finish(folder, json.loads(file.read()), begun)
+                    with contextlib.suppress(ValueError, AttributeError, TypeError, RecursionError):  # half of a plan
+                        _finish(folder, json.loads(file.read(LARGEST_PLAN)), wanted, is_own)
                 path.unlink()
 
 
-def _finish(folder: Path, plan: Mapping[str, str | None], begun: re.Pattern[str]) -> None:
-    """Move what is left to move; a plan says which temporary file of an output becomes it, or what beside it goes."""
+def _finish(folder: Path, plan: Mapping[str, str], wanted: Container[Path], is_own: Callable[[Path], bool]) -> None:
+    """Move what is left to move; a plan says which temporary file of an output becomes it."""
     for relative, name in plan.items():
-        path = folder / relative
-        if name is None:
-            if path == folder / path.name and path.is_file() and not path.is_symlink():
-                path.unlink()
+        path = Path(os.path.normpath((folder / relative).absolute()))
+        match, temporary = temporary_files().fullmatch(name), path.with_name(name)
+        if path not in wanted or match is None or match[1] != path.stem[:_STEM] or temporary.is_symlink():
             continue
-        match = begun.fullmatch(name)
-        if match and match[1] == path.stem[:_STEM] and (path.parent / name).is_file():
-            (path.parent / name).replace(path)
+        if temporary.is_file() and not path.is_symlink() and (not path.exists() or is_own(path)):
+            temporary.replace(path)
 
 
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)

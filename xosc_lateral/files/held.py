@@ -32,8 +32,12 @@ class Held:
 
 def hold(files: Mapping[str, bytes]) -> Held:
     """Hold files until nobody has the result any more."""
-    made = Held(files)
-    return _HELD.setdefault(made.name, made)
+    return hold_again(Held(files))
+
+
+def hold_again(held: Held) -> Held:
+    """Hold what another process, or nobody yet, holds."""
+    return _HELD.setdefault(held.name, held)
 
 
 def held_at(path: Path) -> Held | None:

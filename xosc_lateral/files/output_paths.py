@@ -17,7 +17,7 @@ from typing import Any
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import mend
 from xosc_lateral.files.remote import is_url
-from xosc_lateral.files.source import file_hash
+from xosc_lateral.files.source import check_regular, file_hash
 
 STDOUT = "-"  # name of the standard output where an output is asked for
 LONGEST_NAME = 255  # of a file, on all common systems [byte]
@@ -68,7 +68,7 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
     """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)
-    mend(wanted)
+    mend(wanted, is_own)
     for output in wanted:
         if not force and output.exists() and not is_own(output):
             raise FormatError("exists and was not written by xosc-lateral; --force replaces it", path=output)
@@ -84,6 +84,8 @@ def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) 
             continue
         if output.is_dir():
             raise FormatError("is a folder, not a file to write to", path=output)
+        if output.exists():
+            check_regular(output)
         real = real_path(output, folders)
         if (why := taken.get(real)) is not None:
             raise FormatError(why, path=output)
@@ -139,16 +141,22 @@ def is_own(path: Path) -> bool:
     return _own_table(path)
 
 
-def template_mark(text: str) -> str:
-    """Comment at the end of a template's file that says whether it was edited since. `text` has none yet."""
-    return f"<!-- xosc-lateral template, sha256 {hashlib.sha256(text.rstrip().encode()).hexdigest()} -->\n"
+def template_mark(text: str, begin: str = "<!-- ", end: str = " -->") -> str:
+    """Comment, a line, at the end of a template's file that says whether it was edited since. `text` has none yet."""
+    return f"{begin}{_SEAL}{hashlib.sha256(text.rstrip().encode()).hexdigest()}{end}\n"
+
+
+_SEAL = "xosc-lateral template, sha256 "
+
+
+def _as_written(path: Path) -> bool:
+    text, _, mark = path.read_bytes().rpartition(_SEAL.encode())
+    body, line, _ = text.rpartition(b"\n")
+    return bool(line) and mark.startswith(hashlib.sha256(body.rstrip()).hexdigest().encode())
 
 
 def _own_xml(path: Path) -> bool:
-    if b"xosc-lateral provenance: " in _head(path) or b"[xosc-lateral: " in _head(path):
-        return True
-    body, _, mark = path.read_bytes().rpartition(b"<!-- xosc-lateral template, sha256 ")
-    return bool(body) and mark.startswith(hashlib.sha256(body.rstrip()).hexdigest().encode())
+    return any(mark in _head(path) for mark in (b"xosc-lateral provenance: ", b"[xosc-lateral: ")) or _as_written(path)
 
 
 def _own_json(path: Path) -> bool:
@@ -172,9 +180,9 @@ def _own_table(path: Path) -> bool:
     return isinstance(values, dict) and _is_ours(values) and values.get("sha256") == file_hash(path)
 
 
-def _own_parquet(path: Path) -> bool:
+def _own_at_end(path: Path) -> bool:
     with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - 4 * _HEAD))  # Parquet's metadata stand at its end
+        file.seek(max(0, path.stat().st_size - 4 * _HEAD))  # Parquet's metadata and a zip file's comment stand there
         return PACKAGE in file.read() or b"xosc_lateral" in _head(path)
 
 
@@ -183,7 +191,11 @@ _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".xosc": _own_xml,
     ".xodr": _own_xml,
     ".json": _own_json,
-    ".parquet": _own_parquet,
+    ".parquet": _own_at_end,
+    ".fmu": _own_at_end,
+    ".c": _as_written,
+    ".h": _as_written,
+    "cmakelists.txt": _as_written,
     ".html": lambda path: b'content="xosc-lateral ' in _head(path),
     ".xqar": lambda path: b'name="xosc-lateral"' in _head(path),
     ".md": lambda path: MARKDOWN_MARK.encode() in _head(path),

@@ -22,7 +22,7 @@ from xosc_lateral.drivers.model.records import plain
 from xosc_lateral.files.atomic import at_once, mend, write_atomically
 from xosc_lateral.files.configuration import configured_libraries
 from xosc_lateral.files.json_text import canonical_json, parse_json
-from xosc_lateral.files.output_paths import file_name
+from xosc_lateral.files.output_paths import file_name, is_own
 from xosc_lateral.files.source import check_regular, guard_input, read_source, state_key
 from xosc_lateral.files.tables import foreign_errors
 
@@ -149,7 +149,7 @@ def write_profile(profile: DriverProfile, path: str | Path) -> None:
 
     What a killed run has left of it is removed.
     """
-    mend([Path(path)])
+    mend([Path(path)], is_own)
     write_atomically(Path(path), profile_bytes(profile))
 
 

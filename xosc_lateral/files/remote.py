@@ -32,6 +32,10 @@ _ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+):/+(.+)", re.IGNORECASE)
 """A scheme has two letters at least (``C:/`` is a drive); of ``//``, a `Path` leaves one."""
 
 
+SCHEMES = ("s3", "gs", "abfs", "file", "memory")
+"""Of fsspec's, those that only fetch and store files."""
+
+
 def is_url(path: object) -> bool:
     """Whether it is a place that fsspec knows: ``s3://bucket/cut-in.xosc``, ``memory://a``."""
     return isinstance(path, str | Path) and _ADDRESS.fullmatch(str(path)) is not None
@@ -121,6 +125,9 @@ def _files_of(path: PathLike, *, is_pattern: bool) -> list[Path]:
 def _storage(url: str) -> Iterator[tuple[Any, str]]:
     """The file system that an address is of, and what it calls the place. Raises `FormatError` for all that it does."""
     scheme = url.partition("://")[0]
+    if scheme.lower() not in SCHEMES or "::" in url:  # which chains file systems: each may be one that runs programs
+        what = "a chain of storages" if "::" in url else f"{scheme}://"
+        raise FormatError(f"{what} is not read; {', '.join(SCHEMES)} are", path=url)
     try:
         url_to_fs = import_module("fsspec.core").url_to_fs
     except ImportError as error:

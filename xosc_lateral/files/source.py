@@ -108,7 +108,7 @@ def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
             raise FormatError(limit.refusal(before.st_size / 1e6), path=path)
         _guard(before)
         if before.st_size <= IN_MEMORY:
-            data = file.read(IN_MEMORY + 1)
+            data = _part(file, path)
             _remember(path, hash_of(data))
             yield Source(path, io.BytesIO(data), len(data))
             return
@@ -223,6 +223,14 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
             raise _unreadable(error, path) from error
 
 
+def _part(file: IO[bytes], path: Path) -> bytes:
+    """What comes next, one byte more than `IN_MEMORY` at most."""
+    data: bytes | None = file.read(IN_MEMORY + 1)
+    if data is None:  # files of the kernel's that speak when there is something to say
+        raise FormatError("has nothing to read now, and no end", path=path)
+    return data
+
+
 def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
     what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)
@@ -270,8 +278,14 @@ def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
 
 @lru_cache(maxsize=1024)
 def _file_hash(path: Path, _state: tuple[int, ...]) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    digest, size = hashlib.sha256(), 0
+    with _opened(path) as file:
+        while data := _part(file, path):
+            digest.update(data)
+            size += len(data)
+            if max(size, os.fstat(file.fileno()).st_size) > FILE_SIZE.bytes:
+                raise FormatError(FILE_SIZE.refusal(size / 1e6), path=path)
+    return digest.hexdigest()
 
 
 WATCH_TIME = 0.5

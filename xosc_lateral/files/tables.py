@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 
 PARQUET = ".parquet"
 FEATHER = (".feather", ".arrow")
+ARROW = (PARQUET, *FEATHER)
 MOST_LINES = 500  # of a text, that show whether ids begin with 0
 ID_HEADER = re.compile("(id|vin|drive|vehicle|trip|track|session|ride|case)$")
 TEXT_SUFFIXES = (".csv", ".csv.gz", ".csv.zst")
-TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 LONGEST_MESSAGE = 300  # of what a library says about a file; some quote half of it
+TABLE_SUFFIXES = (".csv", ".csv.gz", PARQUET, ".csv.zst", *FEATHER)
 _CHUNK = 1 << 20
 PART_ROWS = 500_000  # of a text are in memory as cells [-]
 
@@ -59,23 +60,18 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> pd.DataFrame:
 def read_text_table(path: Path) -> pd.DataFrame:
     """A table with all cells as text, missing ones empty. Raises `FormatError`: see `read_table`."""
     table = _read(path, dtype=str, keep_default_na=False)
-    return as_text(table) if path.name.lower().endswith(PARQUET) else table
+    return as_text(table) if path.name.lower().endswith(ARROW) else table
 
 
 def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv: Any) -> pd.DataFrame:
-    if path.name.lower().endswith(PARQUET):
+    if path.name.lower().endswith(ARROW):
         with foreign_errors(path, "can't be read as a table"):
-            table: pd.DataFrame = read_parquet(path).to_pandas(split_blocks=True, self_destruct=True)
-            if isinstance(table.index, pd.DatetimeIndex):
-                table = frame_of(table)
+            table = frame_of(read_arrow(path).to_pandas(split_blocks=True, self_destruct=True))
             if not table.columns.is_unique:
                 twice = str(table.columns[table.columns.duplicated()][0])
                 raise FormatError(f"column {twice!r} appears twice", path=path)
             return table.rename(columns=composed)
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
-        if path.name.lower().endswith(FEATHER):
-            read: pd.DataFrame = _feather(source.file).to_pandas()
-            return frame_of(read).rename(columns=composed)
         text = _in_utf8(unpacked_text(source), path, encoding)
         layout, skipped = Layout(), list[int]()
         if "dtype" not in csv:
@@ -273,34 +269,51 @@ def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[byt
         raise FormatError(what, path=path) from error
 
 
-def _feather(file: IO[bytes]) -> Any:
-    import pyarrow.feather as feather
-
-    return feather.read_table(file, memory_map=False)
+_SHARED = re.compile(r"\b(dictionary<|\w+_view\b|run_end_encoded<|\w+_union<)")  # types whose cells may be one cell
 
 
 @apart
-def read_parquet(path: Path, columns: Sequence[str] | None = None, otherwise: str = "") -> Any:
-    """A Parquet file, or some columns of it, as an Arrow table.
+def read_arrow(path: Path, columns: Sequence[str] | None = None, otherwise: str = "") -> Any:
+    """A Parquet or Feather file, or some columns of it, as an Arrow table.
 
     Raises `FormatError`: it is none, or beyond `limits`; `otherwise`: what it is not where it lacks a column.
     """
+    import pyarrow.feather as feather
     import pyarrow.parquet as pq
 
-    with open_source(path) as source, foreign_errors(path, "can't be read as Parquet"):
+    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
+        if path.name.lower().endswith(FEATHER):
+            return _of_cells(feather.read_table(source.file, columns, memory_map=False), source)
         file = pq.ParquetFile(source.file)
         about, known = file.metadata, file.schema_arrow.names
         if missing := [name for name in columns or () if name not in known]:
             raise FormatError(f"no column {missing[0]!r}: {otherwise}", path=path)
         groups = range(about.num_row_groups)
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
-        rows, count = about.num_rows, about.num_columns
-        if count > TABLE_COLUMNS.value:
-            raise FormatError(TABLE_COLUMNS.refusal(count), path=path)
-        if rows * count > TABLE_CELLS.value:
-            raise FormatError(TABLE_CELLS.refusal(rows * count), path=path)
-        source.unpacked(rows * count * _DOUBLE)  # a thousand million equal values take a few bytes in the file
-        return file.read(None if columns is None else list(columns))
+        _refuse_size(about.num_rows, about.num_columns, source)
+        return _of_cells(file.read(None if columns is None else list(columns)), source)
+
+
+def _refuse_size(rows: int, columns: int, source: Source) -> None:
+    if columns > TABLE_COLUMNS.value:
+        raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
+    if rows * columns > TABLE_CELLS.value:
+        raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
+    source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
+
+
+def _of_cells(table: Any, source: Source) -> Any:
+    """An Arrow table, if it is within limits with a cell of its own for every code: texts in a file are there once."""
+    _refuse_size(table.num_rows, table.num_columns, source)
+    table.validate(full=True)
+    size = 0
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        cells = column.cast(column.type.value_type) if str(column.type)[:11] == "dictionary<" else column
+        if _SHARED.search(str(cells.type)):
+            raise FormatError("cells of this kind are not read", path=source.path, element=f"column {name!r}")
+        size += cells.nbytes
+    source.unpacked(size)
+    return table
 
 
 def _separator(text: IO[bytes], path: Path, start: int = 0) -> str:

@@ -11,7 +11,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError, meant_for
-from xosc_lateral.base.limits import XML_TREE
+from xosc_lateral.base.limits import XML_ATTRIBUTES, XML_TREE
 from xosc_lateral.files.source import check_regular, guard_input, hash_of, open_source, read_source, state_key
 from xosc_lateral.files.tables import unpacked_text
 
@@ -22,6 +22,8 @@ _DSL = re.compile(
     rb"\A(?:\xef\xbb\xbf)?(?:\s*#[^\n]*\n|\s*\n)*\s*(?:import|scenario|struct|actor|action|enum|type)\s+[\w.\"]"
 )
 """How a file of OpenSCENARIO DSL begins: comments, then a declaration."""
+
+_CROWDED = etree.XPath(f"//*[count(@*) > {XML_ATTRIBUTES}]")
 
 # Measured with libxml2 2.14 on element-only, attribute-rich and text-rich files: within 15 % of the memory taken.
 _BYTES_PER_TAG, _BYTES_PER_ATTRIBUTE = 150, 250
@@ -68,6 +70,11 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
     document_type: Any = root.getroottree().docinfo.internalDTD  # the stubs know less than lxml
     if document_type is not None and any(True for _ in document_type.entities()):
         raise FormatError("entity declarations are not allowed", path=path, element="DOCTYPE")
+    if crowded := cast("list[etree._Element]", _CROWDED(root)):
+        element = crowded[0]
+        raise FormatError(
+            XML_ATTRIBUTES.refusal(len(element.keys())), path=path, line=line_of(element), element=element.tag
+        )
     return root
 
 

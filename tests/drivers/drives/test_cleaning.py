@@ -118,3 +118,15 @@ def test_units_that_cannot_be_meant_are_refused_with_the_number_that_shows_it(
 def test_several_drives_in_one_are_told_by_times_that_contradict_each_other() -> None:
     with pytest.raises(FormatError, match="38 of 40 rows repeat a time with another offset"):
         clean(time=[0.0, 0.1] * 20, offset=[0.0, 0.0, 0.9, 0.9] * 10, lane_width=[3.5] * 40)
+
+
+def test_a_short_gap_of_a_level_is_filled_from_the_nearer_row() -> None:
+    """Rows of a bus in which each channel comes in rows of its own; exact halves belong to the row before."""
+    place = np.arange(40) % 4 == 0
+    lane = np.where(np.arange(40) % 8 == 2, np.arange(40.0) // 8, np.nan)
+    drive = cleaned(
+        frozenset({"lane_index"}), time=0.05 * np.arange(40), offset=np.where(place, 0.1, np.nan),
+        lane_width=np.where(place, 3.5, np.nan), lane_index=lane,
+    )  # fmt: skip
+    # Known at rows 2, 10, 18, ...; asked at rows 4, 8, 12, ...
+    np.testing.assert_array_equal(drive.context["lane_index"][1:9], [0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0])

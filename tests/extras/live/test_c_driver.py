@@ -35,6 +35,7 @@ from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
 from xosc_lateral.extras.live.c_driver import c_sources, export_c
 from xosc_lateral.extras.live.c_numbers import numbers_of
+from xosc_lateral.extras.live.fmu import export_fmu
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.profiles import read_profile, write_profile
 
@@ -362,3 +363,49 @@ def test_columns_of_any_name_have_fields_in_c(tmp_path: Path) -> None:
     assert compared(driver, profile, 50, 1) < TOLERANCE
     with pytest.raises(DriverProfileError, match="'a b' and 'a-b' are both x_a_b in C"):
         export_c(replace(profile, effects=(of("a b"), of("a-b"))), tmp_path / "d")
+
+
+def settled_alone(driver: CompiledDriver, place: float, *, speed: float = 30.0) -> np.ndarray:
+    """Offsets of 5 s at 100 Hz of a driver who is put at a place a minute after he began."""
+    row = {**dict.fromkeys(driver.columns, np.nan), "speed": speed, "lane_width": 3.6}
+    driver.start(7)
+    for k in range(60):
+        driver.step(float(k), row | {"position": place, "following": 0.0})
+    return np.array([driver.step(59.01 + 0.01 * k, row | {"position": place})[0] for k in range(500)])
+
+
+def test_leading_over_takes_its_time_and_has_no_corner(tmp_path: Path) -> None:
+    """Two places 0.2 m apart: the same driver's offsets differ by the rest, a smooth step (of fifth degree) of 3 s."""
+    driver = CompiledDriver(replace(read_profile("motorway"), effects=()), tmp_path)
+    gap = settled_alone(driver, 0.1) - settled_alone(driver, -0.1)
+    u = np.clip(0.01 * np.arange(1, 501) / 3.0, 0.0, 1.0)
+    np.testing.assert_allclose(gap, 0.2 * (1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("push", "most"), [(4.0, 5.4), (-4.0, 5.4), (8.0, 5.4), (-8.0, 5.4), (50.0, 5.4)])
+def test_nobody_is_led_beyond_one_and_a_half_lanes(push: float, most: float, tmp_path: Path) -> None:
+    """An effect of metres: where it leads to a place within the bound, a vehicle goes there; beyond it, none does."""
+    far = Linear(acts=Acts.LOCATION, column="x", coefficients=(push,), errors=(0.1,), reference=(0.0,))
+    profile = replace(read_profile("motorway"), effects=(far,))
+    driver, traffic = CompiledDriver(profile, tmp_path), Traffic(profile, seed=7)
+    one, on = np.ones(1), np.ones(1, dtype=np.bool_)
+    driver.start(7)
+    ours, theirs = [0.0], [0.0]
+    for k in range(600):
+        row = {**dict.fromkeys(driver.columns, np.nan), "speed": 30.0, "lane_width": 3.6, "x": float(k > 50)}
+        theirs.append(float(driver.step(0.1 * k, row | {"position": theirs[-1]})[0]))
+        seen = Moment(("a",), 30.0 * one, 3.6 * one, ours[-1] * one, on, on, ~on, context={"x": one * (k > 50)})
+        ours.append(float(traffic.step(0.1 * k, seen).offset[0]))
+    for offsets in (ours, theirs):
+        largest = float(np.max(np.sign(push) * np.array(offsets)))
+        assert largest < most + 1e-9
+        assert largest > 0.9 * abs(push) or abs(push) > most
+
+
+@pytest.mark.parametrize("name", ["offset", "rate", "heading", "seed", "fault", "position", "following"])
+def test_a_column_called_as_a_variable_of_all_units_is_refused(name: str, tmp_path: Path) -> None:
+    effect = Linear(acts=Acts.LOCATION, column=name, coefficients=(0.1,), errors=(0.1,), reference=(0.0,))
+    profile = replace(read_profile("motorway"), effects=(effect,))
+    with pytest.raises(DriverProfileError, match=f"a column is called '{name}'"):
+        export_fmu(profile, tmp_path / "d.fmu", compilers=())
+    assert not list(tmp_path.iterdir())

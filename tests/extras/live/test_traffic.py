@@ -268,3 +268,13 @@ def test_who_is_called_like_an_ego_is_under_test_unless_said_otherwise(stated, d
 def test_others_beside_none_are_refused():
     with pytest.raises(ValueError, match="stands alone"):
         UnderTest(["none", "Ego"])
+
+
+@pytest.mark.parametrize("rate", [-2.0, 0.7])
+def test_acceleration_is_the_speeds_change_in_a_second(profile: DriverProfile, rate: float) -> None:
+    """Constant acceleration is seen as such, whatever the model's step."""
+    traffic = Traffic(profile, seed=5)
+    for k in range(300):
+        traffic.step(k * DT, moment(speed=np.full(2, 20.0 + rate * k * DT)))
+    seen = traffic._context(moment(speed=np.full(2, 20.0 + rate * 3.0)))["acceleration"]
+    np.testing.assert_allclose(seen, rate, atol=1e-9)

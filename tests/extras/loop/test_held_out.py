@@ -11,7 +11,7 @@ from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.drivers.model.profile import Provenance
 from xosc_lateral.extras.loop.columns import Column, Values
-from xosc_lateral.extras.loop.held_out import _quantities, fit_without
+from xosc_lateral.extras.loop.held_out import HeldOut, _quantities, fit_without
 from xosc_lateral.extras.loop.identify import Nested, gain_over
 from xosc_lateral.extras.loop.model import Term, fit_model
 from xosc_lateral.extras.loop.selection import Accepted, Gain, Selection
@@ -156,3 +156,13 @@ def test_what_is_scored_keeps_what_a_fold_chose_otherwise_but_not_what_was_taken
     assert [len(one.accepted) for one in judging.selections] == [1, 1, 1]
     assert [len(one.accepted) for one in judging.scored] == [1, 2, 1]
     assert [len(one.accepted) for one in scored.scored] == [1, 1, 1]
+
+
+def test_a_profile_is_surely_worse_where_nearly_all_half_samples_say_so() -> None:
+    """The measured value is 0; the profiles expect 1 and -1.2: a half sample above 0.1 says "worse"."""
+    for count, expected in ((100, True), (95, True), (94, False), (60, False), (50, False), (0, False)):
+        halves = [{"": np.array([0.5 if number < count else -0.5])} for number in range(100)]
+        none = np.zeros((1, 1))
+        sides = {"real": {"": np.zeros(1)}, "before": {"": np.ones(1)}, "after": {"": np.full(1, -1.2)}}
+        scored = HeldOut(None, **sides, runs_before=none, runs_after=none, halves=halves)  # type: ignore[arg-type]
+        assert scored.surely_worse is expected, count

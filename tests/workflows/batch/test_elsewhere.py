@@ -85,7 +85,7 @@ def test_one_scenario(store, folder: Path) -> None:
 
 
 def test_what_is_not_there(store) -> None:
-    with pytest.raises(xl.FormatError, match=r"^nowhere://a.xosc: can't be reached there: Protocol not known"):
+    with pytest.raises(xl.FormatError, match=r"^nowhere://a.xosc: nowhere:// is not read"):
         xl.play("nowhere://a.xosc")
     with pytest.raises(xl.FormatError, match=r"^memory://bucket/none.xosc: no file is called so"):
         xl.play("memory://bucket/none.xosc")
@@ -141,3 +141,15 @@ def test_on_the_command_line(store, tmp_path: Path, monkeypatch) -> None:
     refused = run("states", f"{address}/db/curves.xosc", "-o", f"{address}/states.csv")
     assert refused.exit_code == 1
     assert not (tmp_path / "file:").exists()
+
+
+@pytest.mark.parametrize(
+    "place", ["http://h/a.xosc", "github://o:r@/a.xosc", "sftp://h/a.xosc", "memory://a::http://h/x.xosc"]
+)
+def test_storages_that_are_not_named_are_refused_before_anything_is_asked(place: str, tmp_path: Path) -> None:
+    """As an argument, and in a table of scenarios."""
+    table = tmp_path / "table.csv"
+    table.write_text(f"scenario,seed\n{place},1\n")
+    for source in (place, table):
+        with pytest.raises(xl.FormatError, match="is not read; s3, gs, abfs, file, memory are"):
+            xl.convert_many(source, tmp_path / "out")

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.workflows.batch.manifest import (
+    MANIFEST,
     ManifestRow,
     Timing,
     read_manifest,
@@ -82,3 +87,13 @@ def test_timings_come_back(tmp_path: Path) -> None:
     write_timings(written.items(), tmp_path / "t")
     assert read_timings(tmp_path / "t") == written
     assert read_timings(tmp_path / "none") == {}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of memory are Linux' own")
+def test_a_manifest_of_texts_that_fill_any_memory_is_none(tmp_path: Path) -> None:
+    """3 MB a row and column, once in the file."""
+    texts = pa.DictionaryArray.from_arrays(np.zeros(1000, np.int32), pa.array(["x" * 3_000_000]))
+    pq.write_table(pa.table(dict.fromkeys(("output", "scenario"), texts)), tmp_path / MANIFEST, compression="zstd")
+    assert (tmp_path / MANIFEST).stat().st_size < 1_000_000
+    with pytest.raises(FormatError, match="not enough memory"):
+        list(read_manifest(tmp_path / MANIFEST))

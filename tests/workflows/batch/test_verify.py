@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +18,9 @@ from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.base.version import BEHAVIOUR
 from xosc_lateral.cli import main
 from xosc_lateral.files.openscenario.provenance import content_hash
-from xosc_lateral.workflows.batch.manifest import MANIFEST
+from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow
+from xosc_lateral.workflows.conversion.settings import OPTIONS, RECORDED
+from xosc_lateral.workflows.options import SHARED
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +161,65 @@ def test_who_edits_the_provenance_and_knows_how_is_named(copy: Path, name: str) 
         assert main(["reproduce", str(output), "-o", str(copy / "again.xosc")]) == 1
 
 
+PATHS = (
+    "/dev/zero",
+    "/proc/kmsg",
+    "/",
+    "fifo",
+    "sparse",
+    "link",
+    "gone",
+    "\0",
+    "a" * 120_000,
+    "../" * 500,
+    "http://x/y",
+)
+"""Of every kind, as a record may name them; some are made in the test."""
+
+
+@pytest.fixture
+def odd_paths(copy: Path) -> Path:
+    """A folder with a pipe, a file of a terabyte without a byte on the disk, and a link to a device."""
+    folder = copy / "in" / "0"
+    os.mkfifo(folder / "fifo")
+    with (folder / "sparse").open("wb") as file:
+        file.truncate(10**12)
+    (folder / "link").symlink_to("/dev/zero")
+    return folder
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX files")
+def test_paths_of_every_kind_in_a_provenance_cost_a_line(copy: Path, odd_paths: Path) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    text = output.read_text("utf-8")
+    for path in PATHS:
+        for change in (
+            lambda facts, path=path: facts.update(scenario=path),
+            lambda facts, path=path: facts.update(scenario=f"../../in/0/{path}"),
+            lambda facts, path=path: facts["inputs"].update({path: "0" * 64}),
+            lambda facts, path=path: facts["options"].update(profile=f"{path}/x.json"),
+            lambda facts, path=path: facts["options"].update(profile=path, entity={"CutIn": path}),
+            lambda facts, path=path: facts["options"].update(road=path),
+            lambda facts, path=path: facts["options"].update(context=path),
+        ):
+            output.write_text(tampered(text, change), encoding="utf-8")
+            for failing in xl.verify(output, fast=path != PATHS[0]).failing:
+                assert all("\n" not in what and len(what) < 5000 for _, what in failing.problems)
+
+
+@pytest.mark.parametrize("name", sorted({*OPTIONS, *SHARED, "names_may_lack", "__class__", "x" * 10_000} - {*RECORDED}))
+def test_no_record_sets_an_option_that_its_writer_does_not_state(copy: Path, name: str) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    text = output.read_text("utf-8")
+    for change in (lambda facts: facts["options"].update({name: "/lib/x.so"}), lambda facts: facts.update({name: "x"})):
+        output.write_text(tampered(text, change), encoding="utf-8")
+        (failing,) = xl.verify(output, fast=True).failing
+        assert [kind for kind, _ in failing.problems] == ["not ours"] and repr(name[:60]) in failing.problems[0][1]
+        assert main(["reproduce", str(output), "-o", str(copy / "again.xosc")]) == 1
+    with pytest.raises(ValueError, match=re.escape(repr(name[:60]))):
+        ManifestRow.from_dict(pd.read_parquet(copy / "out" / MANIFEST).iloc[0].to_dict() | {name: 1})
+
+
 def test_content_that_is_sealed_anew_and_files_that_no_manifest_names_are_named(copy: Path) -> None:
     output, other = sorted((copy / "out").rglob("*.xosc"))[:2]
     change(output, 'value="33', 'value="34') if 'value="33' in output.read_text() else change(output, 'x="', 'x="1')
@@ -217,3 +280,21 @@ def test_what_is_stale_is_made_anew_with_its_reason_and_kept_if_asked(copy: Path
     assert totals(mode="trajectory") == (8, {"settings differ": 8}, {}, 0)
     next((copy / "out" / "3").glob("*.xosc")).unlink()
     assert totals(mode="trajectory", keep_old=True) == (1, {"changed or gone": 1}, {}, 7), "that is not old but lost"
+
+
+def test_profiles_and_inputs_are_compared_by_their_hashes(copy: Path) -> None:
+    """Of a profile the output's own statement, of inputs the manifest's."""
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    text = output.read_text("utf-8")
+    names = json.loads(re.findall("provenance: (.*?) -->", text)[0])["profiles"]
+    for name in names:
+        forged = tampered(text, lambda facts, name=name: facts["profiles"][name].__setitem__(1, "0" * 64))
+        output.write_text(forged, encoding="utf-8")
+        assert named(xl.verify(output, fast=True)) == {output.name: ["profile"]}
+    output.write_text(text, encoding="utf-8")
+    rows = pd.read_parquet(copy / "out" / MANIFEST)
+    below = output.relative_to(copy / "out").as_posix()
+    rows.loc[rows.output == below, "inputs"] = rows.inputs[rows.output == below].map(lambda one: one.replace("a", "b"))
+    rows.to_parquet(copy / "out" / MANIFEST)
+    (failing,) = xl.verify(copy / "out", fast=True).failing
+    assert failing.output == output and failing.problems[0][1] == "the manifest states another inputs"

@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.kit.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
+from tests.kit.stage import (
+    Stage,
+    after,
+    event,
+    lane_change,
+    maneuvers,
+    on_lane,
+    speed,
+    state_of,
+    teleport,
+    to_lane,
+    when,
+)
 from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
@@ -115,3 +127,16 @@ def test_a_path_of_another_size_begins_nearer_to_the_middle() -> None:
     assert half.pieces[0].offset.tolist() == [0.0, 0.05, -0.05]
     assert half.placed_t == pytest.approx(-1.85)
     assert resized(path, 0.0).pieces == ()
+
+
+def test_who_is_ignored_may_touch_whoever_else_is_and_nobody_more(tmp_path: Path) -> None:
+    """Two cars touch once one is slower; only where both have no offsets of their own is that nobody's fault."""
+    start = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 40.0)) + speed(20.0)}
+
+    def run(wanted: float) -> Played:
+        return Stage(tmp_path).play(maneuvers(event(speed(wanted), trigger=after(1.0))), start=start, last=8.0)
+
+    before, touching = run(20.0), run(30.0)
+    for ignored, count in (((), 1), (("Ego",), 1), (("Lead",), 1), (("Ego", "Lead"), 0)):
+        found = compare_runs(before.scenario, before.network, before.motion, touching.motion, ignored=ignored)
+        assert sum(change.pair is not None for change in found.changes) == count, ignored

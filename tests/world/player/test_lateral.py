@@ -372,3 +372,16 @@ def test_motion_beyond_every_bound_is_an_error_with_entity_and_time(tmp_path: Pa
     with pytest.raises(PlaybackError, match=r"'Ego' leaves every plausible bound at 0\.02 s .*speed = 5000 m/s"):
         entities = (car("Ego", top_speed=1e6, acceleration=1e9),)
         Stage(tmp_path).play(start={"Ego": teleport(on_lane(-1, 10.0)) + speed(5000.0)}, entities=entities)
+
+
+def test_a_lateral_distance_keeps_its_limit_of_jerk_and_uses_it(tmp_path: Path) -> None:
+    start = {"Ego": teleport(on_lane(-2, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 30.0)) + speed(20.0)}
+    limits = (
+        '<DynamicConstraints maxAcceleration="2" maxDeceleration="2" maxSpeed="5" maxAccelerationRate="1" '
+        'maxDecelerationRate="1"/>'
+    )
+    keep = beside(4.0, "right", system="road", limits=limits)
+    played = Stage(tmp_path).play(maneuvers(event(keep, trigger=after(1.0))), start=start, last=12.0)
+    motion = entity(played)
+    jerk = np.diff(motion.y, 3)[60:] / played.motion.step**3
+    assert 0.99 < np.abs(jerk).max() < 1.0 + 1e-3

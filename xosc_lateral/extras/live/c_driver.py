@@ -15,7 +15,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.c_numbers import inputs_of, numbers_of
 from xosc_lateral.files.atomic import together, write_atomically
-from xosc_lateral.files.output_paths import claim, output_folder
+from xosc_lateral.files.output_paths import claim, output_folder, template_mark
 
 
 def identifier(profile: DriverProfile) -> str:
@@ -34,7 +34,8 @@ def export_c(profile: DriverProfile, folder: str | Path, *, force: bool = False)
     claim(written, force=force)
     with together():
         for path, text in zip(written, texts.values(), strict=True):
-            write_atomically(path, text.encode())
+            mark = template_mark(text, "# ", "") if path.suffix == ".txt" else template_mark(text, "/* ", " */")
+            write_atomically(path, text + mark)
     return written
 
 

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.errors import DriverProfileError, SimulationError
 from xosc_lateral.base.limits import DISTANCES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.base.version import __version__
@@ -25,6 +25,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.extras.live.c_driver import c_sources, filled, identifier
 from xosc_lateral.extras.live.c_numbers import inputs_of, usual
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.output_paths import PACKAGE
 
 HOST_COMPILERS = ("cc", "gcc", "clang")
 """What is looked for where no compiler is named; the first that is there."""
@@ -135,6 +136,9 @@ def _description(profile: DriverProfile, version: str, token: str) -> Element:
     if is_2:
         _list_sources(SubElement(simulation, "SourceFiles"), "File", name)
     listed = variables_of(profile)
+    names = ["time", *(variable.name for variable in listed)]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise DriverProfileError(f"profile {profile.name}: a column is called {twice[0]!r}, as a variable of all units")
     add_units(root, {variable.unit for variable in listed if variable.unit is not None})
     logged = SubElement(root, "LogCategories")
     for category in ("logStatusWarning", "logStatusError"):
@@ -193,6 +197,7 @@ def _packed(members: Mapping[str, bytes]) -> bytes:
     """A zip file, the same for the same members."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.comment = PACKAGE
         for name in sorted(members):
             archive.writestr(zipfile.ZipInfo(name), members[name], zipfile.ZIP_DEFLATED)
     return packed.getvalue()

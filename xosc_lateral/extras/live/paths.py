@@ -21,7 +21,7 @@ from xosc_lateral.world.surroundings.context import STEERING_DURATION
 STANDSTILL = 0.1
 """Below this speed a path has no direction. [m/s]"""
 
-SPEEDS_REMEMBERED = 6
+SPEEDS_REMEMBERED = 5
 """Model steps of speed remembered: acceleration is over one second, as in a conversion. [-]"""
 
 NEGLIGIBLE_REST = 1e-12

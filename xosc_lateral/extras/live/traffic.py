@@ -182,7 +182,7 @@ class Traffic:
             k = self._index.get(name)
             if k is not None and self._state["begun"][k]:
                 change = moment.speed[row] - self._state["speeds"][k, 0]
-                columns["acceleration"][row] = change / (SPEEDS_REMEMBERED - 1) / self._step
+                columns["acceleration"][row] = change / SPEEDS_REMEMBERED / self._step
         if moment.places is not None and self._roads is not None:
             columns |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
         columns |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}

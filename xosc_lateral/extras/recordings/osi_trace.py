@@ -20,7 +20,7 @@ from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, T
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.osi import SUFFIXES, osi
 from xosc_lateral.files.source import check_regular, open_source
-from xosc_lateral.files.tables import foreign_errors, read_parquet
+from xosc_lateral.files.tables import foreign_errors, read_arrow
 from xosc_lateral.world.motion.nominal import axes
 
 TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")  # messages of the true world; a sensor view has it as its global ground truth
@@ -128,7 +128,7 @@ class Trace:
         """Ground truths of omega-prime's Parquet, whose lanes or road are in its metadata."""
         path, ground_truth = self.path, osi("osi3.osi_groundtruth_pb2").GroundTruth
         with foreign_errors(path, "can't be read as Parquet"):
-            rows = read_parquet(path, ROW_COLUMNS, "not a recording of omega-prime")
+            rows = read_arrow(path, ROW_COLUMNS, "not a recording of omega-prime")
             about = rows.schema.metadata or {}
             rows = rows.sort_by([("total_nanos", "ascending"), ("idx", "ascending")])
         self.opendrive = about.get(b"xodr")

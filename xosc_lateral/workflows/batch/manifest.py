@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import SMALL_PARSER_MEMORY
+from xosc_lateral.base.memory import address_space
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import check_regular
 from xosc_lateral.files.tables import foreign_errors
@@ -99,7 +101,7 @@ class ManifestRow:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
-        """What `to_dict` gave, without unknown names; `ValueError` for a value that is missing or of the wrong kind."""
+        """What `to_dict` gave; `ValueError` for another name, or a value that is missing or of the wrong kind."""
         import msgspec
 
         if not isinstance(values, Mapping):
@@ -107,6 +109,8 @@ class ManifestRow:
         named = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
         if (version := named.setdefault("schema", 1)) not in range(1, SCHEMA + 1):
             raise ValueError(f"its columns are of version {version}, this program reads up to {SCHEMA}")
+        if foreign := sorted(map(str, named.keys() - {item.name for item in fields(cls)})):
+            raise ValueError(f"{foreign[0][:60]!r} is in no row of this program")
         row = msgspec.convert(named, cls)
         if any(isinstance(value, int) and abs(value) > _MAXIMUM_INTEGER for value in named.values()):
             raise ValueError("a number has more than 64 bits")
@@ -213,5 +217,10 @@ def _read_table(path: Path) -> Iterator[dict[str, Any]]:
 
     check_regular(path)
     with foreign_errors(path, "can't be read as Parquet"), pq.ParquetFile(path) as file:
-        for batch in file.iter_batches(ROW_GROUP):
-            yield from batch.to_pylist()
+        batches = file.iter_batches(ROW_GROUP)
+        while True:
+            with address_space(SMALL_PARSER_MEMORY.value):
+                rows = next((batch.to_pylist() for batch in batches), None)
+            if rows is None:
+                return
+            yield from rows

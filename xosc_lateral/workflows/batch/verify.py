@@ -6,13 +6,13 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.errors import FormatError, XoscLateralError, cut
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
 from xosc_lateral.files.openscenario.provenance import CONTENT_HASH_NAME, content_hash, facts_in, without_provenance
@@ -25,6 +25,7 @@ from xosc_lateral.workflows.batch.jobs import Batch, Fingerprints, Job
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
 from xosc_lateral.workflows.conversion.convert import convert_scenario
+from xosc_lateral.workflows.conversion.result import ConversionProvenance
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings
 from xosc_lateral.workflows.options import declare_options, flag, process_count
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
@@ -104,6 +105,8 @@ class _Origin:
         facts = facts_in(data)
         if facts is None:
             raise FormatError("has no provenance of xosc-lateral", path=output)
+        if foreign := sorted(facts.keys() - {field.name for field in fields(ConversionProvenance)}):
+            raise FormatError(f"its provenance says {foreign[0][:60]!r}, which this program never writes", path=output)
         try:
             scenario = Path(os.path.normpath(output.parent.resolve() / str(facts["scenario"])))
             settings = ConvertSettings.of_record(facts["options"], scenario.parent)
@@ -205,7 +208,7 @@ def _defects(search: ConvertSettings, fast: bool, numbered: tuple[int, _Task]) -
     try:
         return within_limits(partial(_check, search, fast), task, JobLimits())
     except (XoscLateralError, OSError) as error:
-        return [(Problem.FAILED, " ".join(str(error).split()))]
+        return [(Problem.FAILED, " ".join(cut(str(error)).split()))]
 
 
 def _check(search: ConvertSettings, fast: bool, task: _Task) -> list[Defect]:
@@ -263,19 +266,19 @@ def _changes(data: bytes, origin: _Origin) -> list[Defect]:
     for name, sha256 in facts["inputs"].items():
         try:
             if file_hash(Path(os.path.normpath(origin.scenario.parent / name))) != sha256:
-                problems.append((Problem.INPUT, f"{name} has changed"))
+                problems.append((Problem.INPUT, f"{cut(name)} has changed"))
         except (OSError, FormatError, ValueError):
-            problems.append((Problem.INPUT, f"{name} is gone"))
+            problems.append((Problem.INPUT, f"{cut(name)} is gone"))
     settings = origin.settings
     for entity, recorded in sorted((str(entity), profile) for entity, profile in facts["profiles"].items()):
         named = settings.entity.get(entity, settings.profile)
         try:
             profile = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
         except (XoscLateralError, OSError) as error:
-            problems.append((Problem.PROFILE, f"profile of {entity!r}: {error}"))
+            problems.append((Problem.PROFILE, f"profile of {cut(entity)!r}: {cut(str(error))}"))
             continue
         if not isinstance(recorded, list) or recorded[1:] != [profile_hash(profile)]:
-            problems.append((Problem.PROFILE, f"profile {profile.name!r} of {entity!r} has changed"))
+            problems.append((Problem.PROFILE, f"profile {profile.name!r} of {cut(entity)!r} has changed"))
     return problems
 
 

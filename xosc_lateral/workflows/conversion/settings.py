@@ -194,12 +194,13 @@ class ConvertSettings:
 
         Where files are looked for is no part of it, for their hashes are known; nor what refuses more or less.
         """
-        names = [*(name for name, declared in OPTIONS.items() if declared.decides), "step"]
-        return {name: _plain(name, getattr(self, name), folder) for name in names}
+        return {name: _plain(name, getattr(self, name), folder) for name in RECORDED}
 
     @classmethod
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
-        """Settings from what `record` gave; `ValueError` for a value that can't be."""
+        """Settings from what `record` gave; `ValueError` for another name, or a value that can't be."""
+        if foreign := sorted(values.keys() - set(RECORDED)):
+            raise ValueError(f"{foreign[0][:60]!r} is no setting that outputs state")
         settings: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
         if not LEAST_STEP <= settings["step"] <= 1.0:
             raise ValueError(f"step {settings['step']} s is not within [{LEAST_STEP}, 1]")
@@ -231,6 +232,8 @@ class ConvertSettings:
 
 OPTIONS: Mapping[str, Option] = say.options_of(ConvertSettings)
 """What users can set, by name."""
+RECORDED = (*(name for name, declared in OPTIONS.items() if declared.decides), "step")
+"""What outputs state of it."""
 
 
 class ConvertKeywords(TypedDict, total=False):

@@ -61,9 +61,9 @@ def remade(written: Traffic, made: Traffic, moved: Collection[str]) -> list[Rema
     outputs = {entity.name: entity for entity in made.entities}
     both = [(entity, outputs[entity.name]) for entity in written.entities if entity.name in outputs]
     results = []
-    for one, other in both:
-        rows = slice(0, min(len(one), len(other)))
-        before, after = one.at(rows), other.at(rows)
+    for source, output in both:
+        rows = slice(0, min(len(source), len(output)))
+        before, after = source.at(rows), output.at(rows)
         left = np.cos(before.heading) * (after.y - before.y) - np.sin(before.heading) * (after.x - before.x)
         results.append(Remade(before, after, left, before.name in moved))
     return results

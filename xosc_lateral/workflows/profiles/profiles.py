@@ -309,22 +309,18 @@ def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool
     Raises `FormatError`: It comes with the package or another, can't be read, or there is a profile of the new id.
     """
     from xosc_lateral.files import profiles
-    from xosc_lateral.files.atomic import mend, remove_together, together
     from xosc_lateral.files.source import edit_in_place
 
     path = profiles.own_path(str(name), as_paths(library))
     renamed = profiles.described(profiles.read_profile(path), name=new)
     output = path.with_name(f"{renamed.name}.json")
-    mend([output])
-    if not path.exists():  # a run that was killed had got as far
-        return output
-    if output.exists() and not force and not output.samefile(path):
+    same = output.exists() and output.samefile(path)
+    if output.exists() and not force and not same and output.read_bytes() != profiles.profile_bytes(renamed):
         raise FormatError("there is a profile of this id; --force replaces it", path=output)
     edit_in_place(path)
-    with together():
-        profiles.write_profile(renamed, output)
-        if not (output.exists() and output.samefile(path)):
-            remove_together(path)
+    profiles.write_profile(renamed, output)
+    if not same:  # killed before, there are both, which the next run does not mind
+        path.unlink()
     return output
 
 

@@ -57,9 +57,9 @@ def test_a_start_lies_in_its_bin(model: TwoLevelModel, rel_offset: float, spread
 
 
 def test_a_start_under_a_larger_spread_lies_nearer_to_the_mean(model: TwoLevelModel) -> None:
-    plain_bin, wide_bin = (int(_first_bins(model, SEED, Start(0.3, spread), 1)[0]) for spread in (1.0, 3.0))
-    assert plain_bin == 16
-    assert wide_bin == int((model.mean + (0.3 - model.mean) / 3.0 + 0.5) * 20)
+    plain_bin, wide_bin = (int(_first_bins(model, SEED, Start(0.31, spread), 1)[0]) for spread in (1.0, 3.0))
+    assert plain_bin == 16  # 0.3 is its border
+    assert wide_bin == int((model.mean + (0.31 - model.mean) / 3.0 + 0.5) * 20)
 
 
 def test_what_a_start_lacks_fades_out_as_half_a_cosine() -> None:

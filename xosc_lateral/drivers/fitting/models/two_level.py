@@ -15,6 +15,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.filters import periodograms
+from xosc_lateral.drivers.drives.resampling import in_digits
 from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.model import (
     N_BINS,
@@ -69,7 +70,7 @@ def fit_shaped_noise(
     power = mean_power(fine_parts, window)
     at = np.linspace(0.0, 1.0, len(power))
     hats = np.maximum(0.0, 1.0 - np.abs(at[:, None] * (n_knots - 1) - np.arange(n_knots)[None, :]))
-    damping = np.linalg.lstsq(hats, np.sqrt(power / NOISE_VARIANCE), rcond=None)[0]
+    damping = in_digits(np.linalg.lstsq(hats, np.sqrt(power / NOISE_VARIANCE), rcond=None)[0])
     return ShapedNoise(np.maximum(damping, 0.0), n_taps)
 
 

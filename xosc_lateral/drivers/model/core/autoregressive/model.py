@@ -290,7 +290,8 @@ class AutoregressiveModel(AutoregressiveParameters, frozen=True, eq=False, dict=
         setup = generator(seed, AutoregressiveSeed.DRIVER)
         driver = draw_drivers(self, start, setup, m)
         skip = setup.integers(COARSE_EVERY, size=m)  # no sample of the 5 Hz grid is special
-        past = self.start_factor @ setup.standard_normal((self.coarse.order, m))
+        noise = setup.standard_normal((self.coarse.order, m))
+        past = np.einsum("ij,jk->ik", self.start_factor, noise)  # BLAS adds up in another order on another processor
         knees, limits = _bends(self, driver.mean)
         half = len(self.kernel) // 2
         # The coarse part begins at sample COARSE_EVERY * TICKS after step 0, the fine one at sample `half`.

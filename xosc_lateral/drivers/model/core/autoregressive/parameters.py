@@ -11,7 +11,8 @@ References
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from math import isfinite
+from math import fsum, isfinite, sqrt
+from operator import mul
 from typing import Annotated
 
 import msgspec
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.base.limits import MODEL_ORDER
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
 from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
@@ -143,6 +145,8 @@ class Autoregression(Record, frozen=True, eq=False):
 
     def __post_init__(self) -> None:
         coefficients = frozen_array(self.coefficients)
+        if coefficients.size > MODEL_ORDER.value:
+            raise DriverProfileError(MODEL_ORDER.refusal(coefficients.size))
         if coefficients.ndim != 1 or not np.isfinite(coefficients).all() or not 0 <= self.scale < np.inf:
             raise DriverProfileError(f"autoregression: {coefficients.tolist()}, scale {self.scale}")
         root = largest_root(coefficients)
@@ -158,7 +162,7 @@ class Autoregression(Record, frozen=True, eq=False):
     def power(self, frequency: FloatArray) -> FloatArray:
         """Spectral density at frequencies [cycles per step], shape (n,), 0 to 0.5; white noise of variance 1 has 1."""
         turns = _turns_on_grid(self.order) if frequency is FREQUENCIES else _turns(frequency, self.order)
-        gain = 1.0 - turns @ self.coefficients
+        gain = 1.0 - np.einsum("ij,j->i", turns, self.coefficients)  # BLAS adds up otherwise on other processors
         return np.asarray(self.scale**2 / np.abs(gain) ** 2)
 
     def covariance(self, n_lags: int) -> FloatArray:
@@ -260,8 +264,21 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         covariance = self.coarse.covariance(order)
         if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
             return np.zeros((order, order))
-        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
-        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
+        covariance[0] *= 1.0 + 1e-9
+        return _triangle(covariance.tolist())
+
+
+def _triangle(covariance: list[float]) -> FloatArray:
+    """Cholesky's factor of a covariance that depends on the lag, shape (n,) -> (n, n); libraries add up in other orders
+    on other processors, and what is exported is the same bytes on all.
+    """
+    rows: list[list[float]] = []
+    for k in range(len(covariance)):
+        rows.append([])
+        for j, above in enumerate(rows):
+            rest = covariance[k - j] - fsum(map(mul, rows[k], above[:j]))
+            rows[k].append(sqrt(rest) if j == k else rest / above[j])
+    return np.array([row + [0.0] * (len(covariance) - len(row)) for row in rows])
 
 
 CANDIDATES = 64

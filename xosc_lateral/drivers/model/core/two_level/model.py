@@ -17,6 +17,7 @@ from __future__ import annotations
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from math import fsum
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -133,7 +134,7 @@ class MarkovChain:
         transition = self.transition
         system = np.vstack([transition.T - np.eye(self.n_bins), np.ones(self.n_bins)])
         share = np.linalg.lstsq(system, np.append(np.zeros(self.n_bins), 1.0), rcond=None)[0]
-        share = np.where(self.support, np.maximum(share, 0.0), 0.0)
+        share = np.where(self.support, np.maximum(np.round(share, 12), 0.0), 0.0)  # the same on every processor
         return np.asarray(share / share.sum())
 
     @cached_property
@@ -144,7 +145,7 @@ class MarkovChain:
     @property
     def mean(self) -> float:
         """Mean of the coarse part in the long run. [-]"""
-        return float(self.stationary @ self.centres)
+        return fsum(self.stationary * self.centres)
 
 
 def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:
