@@ -82,6 +82,7 @@ def find(
             file.write(json.dumps(lines[-1], default=float) + "\n")
             file.flush()
     kinds, rows = by_kind(machine, lines), []
+    count = len(lines)
     for kind, found in sorted(kinds.items(), key=lambda item: (item[0][2], len(item[1]))):  # silent and rare ones first
         seed, spec, one = found[0]
         spec, one = shrink(machine, spec, one, tries, begun + seconds)
@@ -93,7 +94,7 @@ def find(
         kept = json.dumps({"seed": seed, "finding": one, "spec": spec}, indent=1, default=float)
         (folder / "finding.json").write_text(kept, encoding="utf-8")
         rows.append(
-            f"| {machine.name} | {kind[0]} | {kind[1]} | {'yes' if kind[2] else '**no**'} | {len(found)} of {len(lines)} "
+            f"| {machine.name} | {kind[0]} | {kind[1]} | {'yes' if kind[2] else '**no**'} | {len(found)} of {count} "
             f"| {max(row[2]['size'] for row in found):.3g} | {one.get('context', '')} | {seed}: "
             f"{one.get('who', '')} {one.get('ego', '')} at {one.get('t', 0.0):.2f} s |"
         )

@@ -27,6 +27,11 @@ FRAME_WAY = 0.05
 """By which the way of a frame may differ from what the speed says, more than in the source. [m]"""
 SWERVE = 0.1
 """Beyond the marking, and farther than in the replay of the same seed. [m]"""
+CEILINGS = {
+    "AS_WRITTEN": 0.05, "ALONG": 0.75, "FRAME_TURN": 0.010, "LATERAL_ACCELERATION": 3.0, "YAW_RATE": 0.15,
+    "HEADING": 0.0524, "CREEP": 0.002, "TURN_AT_REST": 5e-3, "AFTER_A_SHIFT": 2.0,
+}  # fmt: skip
+"""The look's bounds as they were agreed upon: who widens one in the product blinds this judge, too, and is found."""
 SAME_TIME = 1.0
 """Of a finding and of a message that tells it. [s]"""
 TELLING = {
@@ -228,6 +233,8 @@ def compares(spec, a, b, moved, there, replay=None):
             }
         )
     out += touches(a, b)
+    wider = (name for name, most in CEILINGS.items() if getattr(look, name) > most)
+    out += [{"kind": f"bound is wider: {name}", "who": "Ego", "t": 0.0, "size": getattr(look, name)} for name in wider]
     for who, rows in a["rows"].items():
         if who not in b["rows"]:
             out.append({"kind": "entity missing", "who": who, "t": 0.0, "size": 1.0})
