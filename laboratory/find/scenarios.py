@@ -44,7 +44,16 @@ class Scenarios:
     name = "scenarios"
 
     def __init__(self, library: str | None = None) -> None:
-        self.library = library
+        self.library, self._is_warm = library, False
+
+    def _warm(self) -> None:
+        """Whatever is loaded and compiled at first use, once, for all processes that fork from this one."""
+        if not self._is_warm:
+            self._is_warm = True
+            with tempfile.TemporaryDirectory() as name:
+                path = write.files(self.make(random.Random(2)), Path(name))
+                player.here(path, 5.0)
+                converted(path, Path(name) / "out.xosc", {"mode": "auto"})
 
     def make(self, draw: random.Random) -> Spec:
         return strategies.scenario(draw)
@@ -57,6 +66,7 @@ class Scenarios:
 
     def look(self, spec: Spec, only: Finding | None = None) -> list[Finding]:
         """All that is wrong; `only`: in the stage and under the ego of a finding, while shrinking."""
+        self._warm()
         how, end, out = spec["convert"], spec["end"] + 2, list[Finding]()
         stage = how["mode"] + (" lifelike" if "lane_changes" in how else "")
         with tempfile.TemporaryDirectory() as name:
