@@ -112,6 +112,8 @@ TABLE = ANY | {
         [rows, rows.assign(offset=-0.4, time=rows["time"] + 0.02)]).sort_values("time")),
     "from the left marking": Bend(lambda rows, _: rows.assign(offset=0.5 * rows["lane_width"] - rows["offset"])),
 }  # fmt: skip
+FOLLOWING = 8.0
+"""Behind which others drive as those that the kit has: what a map says needs more than four vehicles. [s]"""
 OTHERS = {"fcd": None, "commonroad": "commonroad", "osi": "osi_utilities"}
 """Formats whose files are written in many ways, but not bent; the package that one needs."""
 
@@ -213,7 +215,9 @@ def written(spec: Spec, folder: Path) -> tuple[kit.Case, list[str]]:
     if layout in ("commonroad", "osi"):
         write = kit.commonroad_file if layout == "commonroad" else kit.write_osi_trace
         return case, [*words, str(write(case, folder))]
-    own = case.tracks(spec["reference"]).assign(speed=kit.SPEED, width=2.0)
+    alone = case.tracks(spec["reference"]).assign(speed=kit.SPEED, width=2.0)
+    later = alone[alone["id"] != "car"].assign(time=alone["time"] - FOLLOWING, id=alone["id"] + " 2")
+    own = pd.concat([alone, later[later["time"] >= 0.0]]).sort_values("time", kind="stable", ignore_index=True)
     rows = drive_table(case) if layout == "table" else own
     bend.change(rows, spec["size"]).to_csv(folder / "bent.csv", index=False)
     words.append(str(folder / "bent.csv"))
