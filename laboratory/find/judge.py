@@ -32,6 +32,7 @@ CEILINGS = {
     "HEADING": 0.0524, "CREEP": 0.002, "TURN_AT_REST": 5e-3, "AFTER_A_SHIFT": 2.0,
 }  # fmt: skip
 """The look's bounds as they were agreed upon: who widens one in the product blinds this judge, too, and is found."""
+LATERALS = {"change", "offset", "trajectory", "teleport", "beside"}
 SAME_TIME = 1.0
 """Of a finding and of a message that tells it. [s]"""
 TELLING = {
@@ -60,16 +61,19 @@ def together(a, b):
 
 
 def told(finding, messages):
-    """Whether a message names kind, entity and time; the time is asked where the product plays the same run, too."""
+    """Whether a message names kind, entity and time: of the finding, or `since` its event began.
+
+    The time is asked where the product plays the same run, too, and of what has one.
+    """
     words = next((words for kind, words in TELLING.items() if finding["kind"].startswith(kind)), "")
     names = [f"'{name}'" for name in (finding["who"], finding.get("event")) if name]
     for entity, text in messages:
         if not words or not re.search(words, text) or not (entity == finding["who"] or any(n in text for n in names)):
             continue
         times = [float(one) for one in re.findall(r"(\d+(?:\.\d+)?) s\b", text)]
-        if finding.get("ego", "nominal") != "nominal" or "more run" in text:
+        if finding.get("ego", "nominal") != "nominal" or "more run" in text or "of the time that" in text:
             return True
-        if any(abs(one - finding["t"]) <= SAME_TIME for one in times):
+        if any(abs(one - t) <= SAME_TIME for one in times for t in (finding["t"], finding.get("since", finding["t"]))):
             return True
     return False
 
@@ -123,7 +127,10 @@ def happens(names, a, b):
     out, first = [], np.inf
 
     def add(kind, name, t, size=1.0):
-        out.append({"kind": kind, "who": names[name], "t": float(t), "size": float(size), "event": name})
+        begun = max((u for u in then_all.get((name, RUNNING), ()) if u <= t), default=t)
+        out.append(
+            {"kind": kind, "who": names[name], "t": float(t), "size": float(size), "event": name, "since": begun}
+        )
 
     for (name, state), then in sorted(then_all.items()):
         now, starts = now_all.get((name, state), []), state == RUNNING
@@ -167,8 +174,20 @@ def touches(a, b):
             yield {"kind": "contact moved", "who": who, "t": t, "size": abs(t - u)}
 
 
-def moves(spec, who, source, other, shifted, *, is_moved, replay=None):
-    """How a vehicle moves otherwise: kind, time, size. `replay`: rows of its replay of the same seed, when asked."""
+def busy(spec, run, who, time):
+    """Rows in which actions of its own move a vehicle aside."""
+    own = {event["name"] for event in spec["events"] if event["of"] == who and {do[0] for do in event["do"]} & LATERALS}
+    rows = np.zeros(len(time), dtype=bool)
+    for name in own:
+        found = occurrences(run, {name})
+        ends = found.get((name, DONE), [])
+        for begins in found.get((name, RUNNING), []):
+            rows |= (time >= begins) & (time <= min((end for end in ends if end >= begins), default=np.inf) + 1.0)
+    return rows
+
+
+def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False):
+    """How a vehicle moves otherwise: kind, time, size; `own`: see `busy`; `replay`: its replay`s rows, when asked."""
     tracks = [
         Track(who, rows[:, 0], dict(zip(("x", "y", "heading", "speed"), rows[:, 1:5].T, strict=True)), np.empty(0, int))
         for rows in (source, other)
@@ -197,7 +216,7 @@ def moves(spec, who, source, other, shifted, *, is_moved, replay=None):
         again = replay()
         if again is not None and past.max() > SWERVE + max(0.0, _beyond(spec, who, again).max()):
             yield "swerves", source[past.argmax(), 0], past.max()
-    drives = source[:, 4] > look.DRIVING_SPEED
+    drives = (source[:, 4] > look.DRIVING_SPEED) & ~own
     if drives.sum() > 4.0 / 0.01:
         aside = (other[:, 2] - source[:, 2]) * np.cos(source[:, 3]) - (other[:, 1] - source[:, 1]) * np.sin(
             source[:, 3]
@@ -243,6 +262,7 @@ def compares(spec, a, b, moved, there, replay=None):
         if len(source) < 50:
             continue
         again = (lambda name=who: replay(name)) if replay else None
-        found = moves(spec, who, source, other, shifted, is_moved=who in moved, replay=again)
+        own = busy(spec, a, who, source[:, 0])
+        found = moves(spec, who, source, other, shifted, is_moved=who in moved, replay=again, own=own)
         out += [{"kind": kind, "who": who, "t": float(t), "size": float(size)} for kind, t, size in found]
     return [{**one, "context": context(spec, a, one["who"], one["t"])} for one in out]
