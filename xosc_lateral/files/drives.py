@@ -175,8 +175,10 @@ def require_evidence(
         what = f"is {median:.4g} m/s (median): it counts backwards, speed=COLUMN:-m/s turns the sign"
         raise FormatError(what, path=path, element="column 'speed'")
     if median > most:
-        what = f"is {median:.4g} m/s (median), more than {most:g}; if it is in km/h: --map speed=COLUMN:km/h, in mph: speed=COLUMN:mph"
-        what += "" if "speed" in named else ", else speed=COLUMN:m/s"
+        what = f"is {median:.4g} m/s (median), more than {most:g}; if it is in km/h: --map speed=COLUMN:km/h"
+        what += (
+            ", in mph: speed=COLUMN:mph" if "speed" in named else ", in mph: speed=COLUMN:mph, else speed=COLUMN:m/s"
+        )
         raise FormatError(what, path=path, element="column 'speed'")
     known = np.isfinite(offset + width)
     if known.any():

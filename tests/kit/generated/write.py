@@ -373,10 +373,11 @@ def scenario(spec, road_file, ways):
         for one in (spec["vehicles"] if spec.get("parameters") else ())
     )
     catalog = '<VehicleCatalog><Directory path="catalogs"/></VehicleCatalog>' if spec.get("catalog") else ""
+    entities = "".join(vehicle(one, bool(catalog) and one["class"] in CLASSES) for one in spec["vehicles"])
     return (
         f"{header(minor)}<ParameterDeclarations>{parameters}</ParameterDeclarations>"
         f'<CatalogLocations>{catalog}</CatalogLocations><RoadNetwork><LogicFile filepath="{road_file}"/></RoadNetwork>'
-        f"<Entities>{''.join(vehicle(one, bool(catalog) and one['class'] in CLASSES) for one in spec['vehicles'])}</Entities>"
+        f"<Entities>{entities}</Entities>"
         f'<Storyboard><Init><Actions>{init}</Actions></Init><Story name="story">{acts}</Story>'
         f"<StopTrigger>{at(spec['end'], 'greaterThan')}</StopTrigger></Storyboard></OpenSCENARIO>"
     )
