@@ -167,10 +167,9 @@ def _shown(profile: DriverProfile, table: pd.DataFrame, ends: Any) -> float:
         name: np.full(n, float(table[name].median())) for name in table if name not in ("time", "offset", "lane_width")
     }
     width, means = np.full(n, float(table["lane_width"].median())), []
-    speed = usual.get("speed", np.full(n, 26.0))
     for end in (ends.low, ends.high):
         context = usual | {name: np.full(n, value) for name, value in end.items()}
-        segment = Segment(time, width, speed, context)
+        segment = Segment(time, width, context.get("speed", np.full(n, 26.0)), context)
         seeds = np.random.SeedSequence(3).spawn(8)
         means.append(np.mean([OffsetSampler(profile, seed).sample(segment)[n // 3 :].mean() for seed in seeds]))
     return float(means[1] - means[0])
