@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: names pages laboratory mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles templates loop-dlr picture map clean
+.PHONY: names pages laboratory find mutants fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed. What is installed is not listed.
 QUICK := --disable-pip-version-check --quiet --progress-bar on --no-compile
@@ -70,6 +70,11 @@ fast: $(DEV_STAMP)
 laboratory: $(DEV_STAMP)
 	$(BIN)/python -m pip install $(QUICK) -e '.[board]'
 	$(BIN)/python -m pytest -n 2 --dist worksteal laboratory/tests
+
+# Scenarios, recordings and drivers from a new seed (or SEED), judged and shrunk: what nobody thought of. A table of
+# kinds, told or silent, with the smallest input of each, lands in out/find. esmini's library: ESMINI_LIBRARY.
+find: $(DEV_STAMP)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m laboratory.find out/find --minutes $(or $(MINUTES),20) $(if $(SEED),--seed $(SEED))
 
 # Mutants of every input format against its reader: bytes damaged, then well-formed files that say something else;
 # twenty minutes or so. What hurts lands in out/faults.

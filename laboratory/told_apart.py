@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import xosc_lateral as xl
-from laboratory.driven_ego import driven
+from laboratory.find import player
 from tests.kit.made import reactive
 from tests.kit.made.roads import Map, plan_view, road
 from xosc_lateral.workflows.conversion.load import play_scenario
@@ -59,17 +59,16 @@ def scenario(folder: Path, speed: float) -> Path:
     return path
 
 
-def offsets(path: Path, library: Path | None) -> FloatArray:
+def offsets(path: Path, speed: float, library: Path | None) -> FloatArray:
     """Of each car every `STEP`, shape (cars, n). [m]"""
     moments = np.arange(0.0, SECONDS - STEP, STEP)
     if library is None:
         entities = play_scenario(path).motion.entities
         tracks = [(one.time, one.offset) for one in entities if one.name != "Ego"]
     else:
-        rows = driven(library, path, "1.0", SECONDS)
-        assert rows is not None, f"{path} is refused"
-        frames = [frame for name, frame in sorted(rows.rows.items()) if name != "Ego"]
-        tracks = [(frame.time.to_numpy(), frame.offset.to_numpy()) for frame in frames]
+        way = player.ego_path(player.apart(player.run, str(library), path, SECONDS), speed)
+        rows = player.apart(player.run, str(library), path, SECONDS, "1.0", way)["rows"]
+        tracks = [(one[:, 0], one[:, 7]) for name, one in sorted(rows.items()) if name != "Ego"]
     return np.array([np.interp(moments, time, offset) for time, offset in tracks])
 
 
@@ -147,7 +146,7 @@ def measure(first: int, count: int, speed: float, library: Path | None) -> dict[
             for paths, ego in zip(kinds, (["none"], ["Ego"]), strict=True):
                 output = Path(folder) / f"{ego[0]}.xosc"
                 xl.convert(source, output, ego=ego if ego == ["Ego"] else "none", seed=seed, force=True)
-                paths.append(offsets(output, library))
+                paths.append(offsets(output, speed, library))
     cuts = [np.concatenate([windows(one) for one in paths]) for paths in kinds]
     seeds = np.repeat(np.arange(count), len(cuts[0]) // count)
     (frequency, replay), (_, reacting) = (spectrum(cut) for cut in cuts)

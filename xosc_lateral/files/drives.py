@@ -171,8 +171,6 @@ def require_evidence(
         lane = columns["lane_index"][mine] if "lane_index" in columns else None
         for all_of, seen in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
             all_of.append(seen)
-    if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
-        raise FormatError(wrong, path=path, element="column 'time'")
     speed, most = columns.get("speed", np.zeros(0)), MAX_MEDIAN_SPEED * (2.0 if "speed" in named else 1.0)
     median = float(np.nanmedian(speed)) if np.isfinite(speed).any() else 0.0
     if median < 0.0:
@@ -180,13 +178,17 @@ def require_evidence(
         raise FormatError(what, path=path, element="column 'speed'")
     if median > most:
         what = f"is {median:.4g} m/s (median), more than {most:g}; if it is in km/h: --map speed=COLUMN:km/h"
-        what += "" if "speed" in named else ", else speed=COLUMN:m/s"
+        what += (
+            ", in mph: speed=COLUMN:mph" if "speed" in named else ", in mph: speed=COLUMN:mph, else speed=COLUMN:m/s"
+        )
         raise FormatError(what, path=path, element="column 'speed'")
     known = np.isfinite(offset + width)
     if known.any():
         farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))
         if wrong := evidence.of_lane_changes(np.concatenate(jumps), np.concatenate(steps), median, farthest):
             raise FormatError(wrong, path=path, element="column 'offset'")
+    if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
+        raise FormatError(wrong, path=path, element="column 'time'")
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:

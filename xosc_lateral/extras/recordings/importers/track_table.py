@@ -225,17 +225,17 @@ def tracks_of_rows(
 
 def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     moving = (np.maximum(driven, speed) > MOVING_SPEED) & (np.minimum(driven, speed) > 0.0)
+    places = {f"x and y may be in {unit} (x=COLUMN:{unit}, y=COLUMN:{unit})": by
+              for unit, by in (("ft", 0.3048), ("cm", 1e-2), ("mm", 1e-3))}  # fmt: skip
     if moving.any() and (usual := float(np.median(driven[moving]))) > MAX_MEDIAN_SPEED and (speed == driven).all():
-        units = {"ft": 0.3048, "cm": 1e-2, "mm": 1e-3}
-        causes = [f"x and y may be in {unit} (x=COLUMN:{unit}, y=COLUMN:{unit})" for unit, by in units.items()
-                  if USUAL_SPEEDS[0] < usual * by < USUAL_SPEEDS[1]]  # fmt: skip
+        causes = [cause for cause, by in places.items() if USUAL_SPEEDS[0] < usual * by < USUAL_SPEEDS[1]]
         causes += ["time in min (time=COLUMN:min)"] * (USUAL_SPEEDS[0] < usual / 60.0 < USUAL_SPEEDS[1])
         raise FormatError(f"traffic moves at {usual:.4g} m/s: {', or '.join(causes) or 'a unit is wrong'}", path=path)
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
         return
     factors = {"x and y may be in km (x=COLUMN:km, y=COLUMN:km), or time in ms": 1e3,
-               "time may be in min: time=COLUMN:min": 1.0 / 60.0}  # fmt: skip
+               "time may be in min: time=COLUMN:min": 1.0 / 60.0, **places}  # fmt: skip
     for cause, factor in factors.items():
         if abs(np.log(ratio / factor)) < np.log(MAX_SPEED_RATIO):
             raise FormatError(f"speed is {ratio:.3g} times as fast as x and y move; {cause}", path=path)
