@@ -87,7 +87,11 @@ def read_drives(
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
     names = Counter(drive.name for drive in drives)
-    apart = [drive.name if names[drive.name] == 1 else f"{drive.source}:{drive.name}" for drive in drives]
+    tables = (drive.source.removesuffix(".feather") for drive in drives)  # which frames are held as
+    apart = [
+        drive.name if names[drive.name] == 1 else f"{table}:{drive.name}"
+        for drive, table in zip(drives, tables, strict=True)
+    ]
     seen, again = Counter[str](), Counter(apart)
     for k, name in enumerate(apart):
         seen[name] += 1

@@ -78,7 +78,7 @@ def test_distances_from_the_wheels_are_refused_or_put_to_the_middle(tmp_path: Pa
 
 def test_a_town_in_kilometres_an_hour_is_refused() -> None:
     table = measured().assign(speed=54.0)
-    with pytest.raises(FormatError, match=r"speed is 54 m/s.*if it is in km/h"):
+    with pytest.raises(FormatError, match=r"speed': is 54 m/s.*if it is in km/h"):
         drives_of_table(table, {})
 
 
