@@ -87,11 +87,9 @@ def read_drives(
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
     names = Counter(drive.name for drive in drives)
-    tables = (drive.source.removesuffix(".feather") for drive in drives)  # which frames are held as
-    apart = [
-        drive.name if names[drive.name] == 1 else f"{table}:{drive.name}"
-        for drive, table in zip(drives, tables, strict=True)
-    ]
+    homes = [drive.source.removesuffix(".feather") for drive in drives]  # which frames are held as
+    both = zip(drives, homes, strict=True)
+    apart = [drive.name if names[drive.name] == 1 else f"{home}:{drive.name}" for drive, home in both]
     seen, again = Counter[str](), Counter(apart)
     for k, name in enumerate(apart):
         seen[name] += 1
