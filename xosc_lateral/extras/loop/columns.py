@@ -80,8 +80,6 @@ _ROLE_WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
         (Role.TIME, "time timestamp clock frame counter sequence odometer mileage soc battery fuel elapsed utc"),
     )
 )  # fmt: skip
-    ["cabin", "tyre", "tire", "engine", "oil", "day", "actual", "driven", "desired", "commanded"]
-)
 # A name with one of these says nothing: a temperature of the car itself is no weather, a time of day may act, and a
 # curvature that is driven, or asked for, is not the road's.
 _NEUTRAL_WORDS = frozenset(
