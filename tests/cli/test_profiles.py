@@ -130,19 +130,22 @@ def test_adding_does_not_replace_and_export_writes_what_was_there(team, tmp_path
 
 
 def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
-    names = ["driver-00", "driver-04", "driver-01", "driver-02"]  # the first two are the same driver under two names
+    for name, figure in (("left", ["--mean", 0.6]), ("wide", ["--sdlp", 0.45])):
+        assert run(capsys, "profiles", "derive", "motorway", "-o", tmp_path / f"{name}.json", *figure)[0] == 0
+    # the first two are the same driver under two names
+    names = ["driver-00", "driver-03", tmp_path / "left.json", tmp_path / "wide.json"]
     page = tmp_path / "compared.html"
     code, out, _ = run(capsys, "profiles", "compare", *names, "--library", team, "--json", "--report", page)
     assert code == 0
     compared = json.loads(out)
     (alike,) = [group for group in compared["alike"] if len(group) > 1]
-    assert set(alike) == {"driver-00", "driver-04"}
+    assert set(alike) == {"driver-00", "driver-03"}
     distance, floor = np.array(compared["distance"]), np.array(compared["floors"])
     assert np.diag(floor) == pytest.approx(np.diag(distance), abs=1e-4)
     assert floor[0, 2] == pytest.approx(np.sqrt(0.5 * (floor[0, 0] ** 2 + floor[2, 2] ** 2)), abs=2e-4)
     different = distance > floor
     assert different[2:, :2].all() and not different[0, 1], "each profile by its own floor, not by the shakiest one's"
-    assert "driver-02" in page.read_text(encoding="utf-8")
+    assert "driver-03" in page.read_text(encoding="utf-8")
 
 
 def test_folders_come_from_the_environment_and_a_configuration_file(team, tmp_path, monkeypatch, capsys):

@@ -13,7 +13,7 @@ import xosc_lateral as xl
 from examples.driver_simulator import simulate_drive
 from xosc_lateral.base.errors import FormatError, XoscLateralError
 from xosc_lateral.files.source import file_hash, parsed_hashes
-from xosc_lateral.workflows.profiles.profiles import add_profile, tag_profile
+from xosc_lateral.workflows.profiles.profiles import add_profile, derive_profile, tag_profile
 
 SECONDS = 6.0
 
@@ -204,12 +204,16 @@ def test_tags_and_metadata_go_into_a_library_and_find_their_profile_again(tmp_pa
     assert one["offset"].equals(same["offset"]) and not other["offset"].equals(same["offset"])
 
 
-def test_profiles_are_as_far_from_each_other_in_whatever_order_they_are_named():
-    names = ["motorway-vehicle-1", "rural", "motorway"]
+def test_profiles_are_as_far_from_each_other_in_whatever_order_they_are_named(tmp_path):
+    left, wide = (str(tmp_path / f"{name}.json") for name in ("left", "wide"))
+    xl.write_profile(derive_profile("motorway", mean=0.6, name="left").profile, left)
+    xl.write_profile(derive_profile("motorway", sdlp=0.45, name="wide").profile, wide)
+    names = [left, wide, "motorway"]
     table = xl.compare_profiles(*names).to_frame()
     # from themselves: what drives as short as the few minutes that they were fitted to differ by
     assert (np.diag(table) < 0.7 * table.to_numpy().max(axis=1)).all()
     turned = xl.compare_profiles(*names[::-1]).to_frame()
+    names = ["left", "wide", "motorway"]
     np.testing.assert_allclose(turned.loc[names, names], table, rtol=0.5)  # other random numbers, the same drivers
     with pytest.raises(ValueError, match="1 profile to compare"):
         xl.compare_profiles(names[0])

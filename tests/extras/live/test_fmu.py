@@ -279,10 +279,10 @@ def test_it_runs_where_this_package_is_not(version: str, tmp_path: Path) -> None
 def test_sources_compile_without_a_warning_and_several_units_link_into_one_program(name: str, tmp_path: Path) -> None:
     sources = []
     for version, profile in (("2.0", "motorway"), ("3.0", REFINED), ("3.0", "rural")):
-        unit = exported(version, tmp_path / f"{profile}.fmu", "--compiler", compiler(name), profile=profile)
+        unit = exported(version, tmp_path / f"{Path(profile).stem}.fmu", "--compiler", compiler(name), profile=profile)
         with zipfile.ZipFile(unit) as archive:
-            archive.extractall(tmp_path / profile)
-        sources += sorted((tmp_path / profile / "sources").glob("*.c"))
+            archive.extractall(unit.with_suffix(""))
+        sources += sorted((unit.with_suffix("") / "sources").glob("*.c"))
     build(sources, tmp_path / "all.so", "-shared", "-fPIC", *SANITIZED, name=name)
 
 

