@@ -125,8 +125,12 @@ def _use_driver(path: Path) -> None:
     card_text(given_profile(path))
 
 
+STREAMED = {"motorway": "motorway", "refined": REFINED}
+"""A state's file -> the profile that it is of."""
+
+
 def _stream_files(folder: Path) -> Iterable[Path]:
-    for name, profile in (("motorway", "motorway"), ("refined", REFINED)):
+    for name, profile in STREAMED.items():
         stream = OffsetStream(read_profile(profile), 3)
         for k in range(400):
             stream.step({"speed": 30.0 + 0.01 * k})
@@ -140,7 +144,7 @@ def _use_stream(path: Path) -> None:
     except (ValueError, RecursionError):
         return  # a caller's own file, and its reader's error
     try:
-        stream = OffsetStream.from_dict(read_profile(path.stem[:-1]), state)
+        stream = OffsetStream.from_dict(read_profile(STREAMED[path.stem]), state)
     except DriverProfileError as error:
         raise DriverProfileError(f"{path}: {error}") from error
     sane([stream.step({"speed": 30.0}) for _ in range(100)], -15.0, 15.0, "offset")

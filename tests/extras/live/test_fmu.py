@@ -184,7 +184,7 @@ def test_under_a_context_that_changes_gently_it_is_what_is_sampled_a_preview_lat
 ) -> None:
     compiler()
     profile = xl.read_profile(REFINED)
-    unit = exported(version, tmp_path / "driver.fmu", profile=profile.name)
+    unit = exported(version, tmp_path / "driver.fmu", profile=REFINED)
     context = gentle(inputs_of(profile), 300)
     late = np.maximum(np.arange(300) - round(xl.OffsetStream(profile, 0, rate=100.0).preview / 0.2), 0)
     columns = {name: values[late] for name, values in context.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.effects import Linear, Product
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop.close import NO_WORSE, Finding, LoopResult, close_loop
 from xosc_lateral.extras.loop.loop_json import loop_record
 from xosc_lateral.files.drives import read_drives
@@ -58,9 +59,19 @@ def test_curve_cutting_is_sized_and_seen_to_be_ahead_of_the_curve(driven: Driven
 def test_wind_is_sized_as_the_product_that_it_is(driven: Driven) -> None:
     plant = plants.SideWind(0.5)
     idle = [name for name in IDLE if name not in plant.columns]
-    result = close_loop(driven(502, [plant], 2400.0, drop=idle), seed=1)
+    drives = driven(502, [plant], 2400.0, drop=idle)
+    result = close_loop(drives, seed=1)
     finding = only_finding(result, "location", plant.columns)
-    assert_closed(result, finding, plant.size * truth.shift(truth.paired(plant, 502, 2400.0)))
+    (product,) = finding.effects
+    ends = ends_of(product)
+    assert ends is not None
+
+    def cross(wind: Mapping[str, float | np.ndarray]) -> np.ndarray:
+        return np.asarray(wind["wind_speed"] * np.sin(np.radians(wind["wind_direction"])))
+
+    whole = np.ptp(np.quantile(cross(drives[0].context), [0.05, 0.95]))  # for which the target moves by its size
+    planted = plant.size * float(cross(ends.high) - cross(ends.low)) / whole
+    assert_closed(result, finding, planted * truth.shift(truth.paired(plant, 502, 2400.0)))
     assert any(isinstance(effect, Product) for effect in finding.effects)
 
 

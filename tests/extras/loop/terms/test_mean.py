@@ -11,6 +11,7 @@ from xosc_lateral.drivers.model.effects import Acts, Factor, Form, Linear, Produ
 from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.dictionary import beside, respond_by_second
 from xosc_lateral.extras.loop.model import fit_model
+from xosc_lateral.extras.loop.terms.column import driven_values
 from xosc_lateral.extras.loop.terms.mean import NEAR_SCALES, MeanTerm, _profile, _shapes, widening
 
 
@@ -50,7 +51,8 @@ def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of
     term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", lag_s=0.4, response_s=1.5))
     fitted = fit_model(coarse_of(shift + movement(rng, 900.0), {"x": x}), (term,))
     part = fitted.mean_part(term)
-    effect = structs.replace(term.effect, coefficients=tuple(fitted.sizes[part]), errors=(0.1,), reference=(0.0,))
+    known = {"reference": (0.0,), "driven": driven_values(fitted.coarse, ("x",))}
+    effect = structs.replace(term.effect, coefficients=tuple(fitted.sizes[part]), errors=(0.1,), **known)
     assert least <= widening(fitted, effect, part) < most
 
 
@@ -71,7 +73,8 @@ def test_not_knowing_over_which_distance_a_product_fades_widens_its_error() -> N
     widths = []
     for effect in (fading, structs.replace(fading, factors=(fading.factors[0], Factor(column="distance")))):
         fitted = fit_model(coarse_of(bare.timeline.offset + shift, context), (MeanTerm.of(effect),))
-        sized = structs.replace(effect, coefficients=tuple(fitted.sizes), errors=(0.1,), reference=(0.0,))
+        known = {"reference": (0.0,), "driven": driven_values(fitted.coarse, effect.columns)}
+        sized = structs.replace(effect, coefficients=tuple(fitted.sizes), errors=(0.1,), **known)
         widths.append(widening(fitted, sized, slice(0, 1)))
     assert widths[0] > 1.3
     assert len(_shapes(bare, fading)) == len(NEAR_SCALES)
