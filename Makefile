@@ -57,7 +57,8 @@ lint: style names
 test: style names
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m 'not lint and not pages'
 
-# What examples and pages print where they close a loop, the site, what is shipped: before a release.
+# At length: loops from end to end, kills, other processors, recipes followed; what README, pages, examples and helps
+# print; the site.
 pages: $(DEV_STAMP) $(DOCS_STAMP)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m pages
 

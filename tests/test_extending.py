@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.pages
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "examples" / "extending").glob("[a-z]*.md"))
 STEP = re.compile(

@@ -86,6 +86,7 @@ def test_templates_and_profiles_are_listed_with_the_shipped_ones(site, tmp_path)
     assert "acme-calm" in run(site, tmp_path, "-m", "xosc_lateral", "profiles", "list")
 
 
+@pytest.mark.pages
 @pytest.mark.slow
 def test_an_effect_is_tried_by_the_loop_stored_in_a_profile_and_read_back(site, tmp_path):
     drive = simulate_drive(1500.0, seed=6).table.sort_values("time")

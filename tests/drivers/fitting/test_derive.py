@@ -44,6 +44,7 @@ def test_sdlp_mean_and_restlessness_are_those_of_the_offsets(base: DriverProfile
     assert np.sqrt((np.diff(drives, axis=1) ** 2).mean()) / 0.2 == pytest.approx(0.06, rel=0.03)
 
 
+@pytest.mark.pages
 def test_share_near_a_line_counts_the_vehicles_sides(base: DriverProfile, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(deriving, "DRIVE_COUNT", 120)  # a share of rare rows needs more of them
     made = derive(base, Asked(near_line=0.04), "x").profile

@@ -14,6 +14,8 @@ from xosc_lateral.drivers.fitting.models.two_level import fit_two_level
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import write_profile
 
+pytestmark = pytest.mark.pages
+
 FIT = """
 import sys
 from examples.driver_simulator.simulator import simulate_drive

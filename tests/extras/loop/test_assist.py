@@ -18,6 +18,8 @@ from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import parse_map
 from xosc_lateral.files.profiles import read_profile
 
+pytestmark = pytest.mark.pages
+
 WORDS = [word for one in OPENLKA_MAP for word in ("--map", one)]
 PLACE, TIGHTNESS, SECONDS = 0.2, 0.3, 3000.0
 

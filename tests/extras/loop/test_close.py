@@ -25,6 +25,8 @@ from xosc_lateral.extras.loop.close import NO_WORSE, Finding, LoopResult, close_
 from xosc_lateral.extras.loop.loop_json import loop_record
 from xosc_lateral.files.drives import read_drives
 
+pytestmark = pytest.mark.pages
+
 Driven = Callable[..., list[Drive]]
 
 NEAR = 1.4

@@ -59,6 +59,8 @@ from xosc_lateral.extras.loop.selection import Rejected
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.pages.chart import Panel
 
+pytestmark = pytest.mark.pages
+
 SHIFT = 0.4  # [m]
 
 HIDDEN: tuple[Effect, ...] = (

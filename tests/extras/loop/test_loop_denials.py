@@ -16,6 +16,8 @@ from xosc_lateral.extras.loop.close import LoopResult, close_loop
 from xosc_lateral.extras.loop.loop_json import loop_record
 from xosc_lateral.extras.loop.loop_words import outcome
 
+pytestmark = pytest.mark.pages
+
 COLUMNS = ("truck_right", "speed", "time", "distance_left", "distance_right", "lane_index")
 
 

@@ -12,6 +12,8 @@ from tests.kit.simulated import movements
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.drives import read_drives
 
+pytestmark = pytest.mark.pages
+
 Driven = Callable[..., list[Drive]]
 
 SEEDS = range(1, 13)

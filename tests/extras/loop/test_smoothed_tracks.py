@@ -46,7 +46,7 @@ def test_a_refined_profile_moves_above_the_band_as_the_one_that_it_began_with() 
 def test_a_refined_profile_says_where_it_is_valid() -> None:
     low, high = _refined(0.15, read_profile("motorway")).validity.bands
     assert low.source == "1 drive"
-    assert low.high == high.low == pytest.approx(1.5 * 0.15)
+    assert (low.high, high.low) == (0.15, pytest.approx(1.5 * 0.15))  # between them one passes into the other
     assert high.source == "profile motorway"
     alone = _refined(0.15, None).validity
     assert alone.highest_frequency is None or alone.highest_frequency <= 0.15

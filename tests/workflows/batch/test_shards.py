@@ -18,6 +18,8 @@ from xosc_lateral.workflows.batch.call import read_shard
 from xosc_lateral.workflows.batch.jobs import plan_batch
 from xosc_lateral.workflows.batch.journal import FolderInUseError, folder_lock
 
+pytestmark = pytest.mark.pages
+
 
 def run_part(inputs: Path, folder: Path, number: int, count: int, converter=convert, variants: int = 1):
     batch = plan_batch([inputs], folder, variants=variants).part(number, count)

@@ -172,6 +172,7 @@ def movement_by_band(rel_offset: np.ndarray, timeline: Timeline) -> np.ndarray:
     return np.array([np.log(band[timeline.valid].std()) for band in bands])
 
 
+@pytest.mark.pages
 def test_free_runs_wander_as_much_as_the_drive_that_they_were_fitted_to() -> None:
     """A driver who corrects only what is too far off is calm while he drifts away and brisk while he comes back."""
     lacks, errors = [], []
