@@ -22,7 +22,7 @@ $(STAMP): pyproject.toml
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,osi,sumo]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,osi,sumo,pictures]'
 	@touch $@
 
 # And what building the documentation needs.
@@ -133,7 +133,7 @@ $(WHEEL): | $(STAMP)
 # Every package that development and CI install, with hashes; see SECURITY.md. All extras but `commonroad`, whose protobuf
 # is not the one of `osi`.
 LOCK := requirements/lock.txt
-EXTRAS := mdf osi cluster classifier board sumo docs dev
+EXTRAS := mdf osi cluster classifier board sumo pictures docs dev
 UV ?= $(BIN)/uv
 MATRIX ?= 3.11 3.12 3.13
 
