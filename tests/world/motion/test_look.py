@@ -45,7 +45,7 @@ def test_a_driver_s_movement_is_no_finding(speed: FloatArray, bend: float) -> No
     ("kind", "words", "size", "speed", "change"),
     [
         ("corner", "40 mrad in a frame", 0.04, EVEN, {"turned": 0.04 * LATER}),
-        ("corner", "m/s2 sideways", 5.0, EVEN, {"aside": 0.05 * np.sin(10.0 * TIME)}),
+        ("corner", "m/s2 sideways", 5.0 * (np.sin(0.5) / 0.5) ** 2, EVEN, {"aside": 0.05 * np.sin(10.0 * TIME)}),
         ("heading", "is turned by 4.0 degrees", 0.0698, EVEN, {"turned": 0.00698 * TIME.clip(0.0, 10.0)}),
         ("elsewhere", "2.00 m elsewhere along the road", 2.0, EVEN, {"speed": EVEN + 0.2 * LATER}),
         ("creeps", "moves by 20 mm while it stands", 0.02, STOPPING, {"aside": 0.02 * np.clip(TIME - 9.0, 0.0, 1.0)}),

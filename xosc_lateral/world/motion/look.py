@@ -30,12 +30,13 @@ DRIVING_SPEED = 3.0
 """Above which somebody drives. [m/s]"""
 LARGEST_SLIDE = 0.05
 """By which a way may be longer in a window than what the speed says, more than in the source. [m]"""
-LOOK_STEP, LOOK_AROUND = 0.05, 3.0
-"""Accelerations and yaw rates are seen at 20 Hz, and held against the largest of the source so far around. [s]"""
+LOOK_STEP, LOOK_AROUND = 0.1, 3.0
+"""Accelerations and yaw rates are seen from vertex to vertex of a path (closer, straight pieces are all corners: twice
+the acceleration at 20 Hz), and held against the largest of the source so far around. [s]"""
 FRAME_TURN, FRAME = 0.010, 0.01
 """By which a heading may turn more in a frame of a player [rad], and how long one is; in longer ones, by `YAW_RATE`
 besides. [s]"""
-LATERAL_ACCELERATION, YAW_RATE = 3.0, 0.15
+LATERAL_ACCELERATION, YAW_RATE = 2.0, 0.15
 """Beyond the source's: somebody has steered into a corner of a path. [m/s2], [rad/s]"""
 HEADING, LARGEST_TURN = np.radians(3.0), 0.1
 """Against the source's; and as nobody drives. [rad]"""
