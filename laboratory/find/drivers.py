@@ -20,7 +20,7 @@ from laboratory.find.engine import Finding, Spec
 from tests.kit.simulated import movements, preview_driver
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import all_runs
-from xosc_lateral.drivers.fitting.closing import found_in
+from xosc_lateral.drivers.evaluation.look_words import found_in
 from xosc_lateral.drivers.model.effects.base import Acts, ColumnEffect
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler
