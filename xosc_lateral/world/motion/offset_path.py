@@ -32,8 +32,8 @@ SHORTEST_GAP, LONGEST_GAP = 1.0, 4.0
 """Between vertices where the road is straight. [m]"""
 CHORD_ERROR, CORNER, LEAST_GAP = 0.002, 0.008, 0.2
 """By which straight pieces may cut a bend [m], turn from one to the next [rad], and how short they may be. [m]"""
-LOOK_STEP, CORNER_ACCELERATION = 0.05, 1.0
-"""Looked at so often [s], corners of a path add at most so much to what a bend itself asks. [m/s2]"""
+RECORDED_STEP, CORNER_ACCELERATION = 0.05, 1.0
+"""Recorded at 20 Hz [s], corners of a path add at most so much to what a bend itself asks. [m/s2]"""
 WIDTHS = tuple(0.2 * 1.5 ** np.arange(9))
 """Standard deviations of the kernel by which movement is smoothed, tried in order: up to 5 s of the clock. [s]"""
 SPREAD = 2.0
@@ -134,7 +134,7 @@ def spacing_of(
     bend = np.maximum(np.abs(curvature), 1e-6)
     way = np.interp(distance, clock.distance[1:], np.diff(clock.distance) / np.diff(clock.time))
     fastest = np.maximum(np.interp(distance, clock.distance, clock.speed), 1e-3)
-    at_speed = LOOK_STEP * (fastest + CORNER_ACCELERATION / (bend * fastest))
+    at_speed = RECORDED_STEP * (fastest + CORNER_ACCELERATION / (bend * fastest))
     by_time = np.clip(VERTEX_TIME * np.abs(speed), np.minimum(SHORTEST_GAP, VERTEX_TIME * way), LONGEST_GAP)
     gap = np.maximum(
         np.minimum.reduce([by_time, np.sqrt(8.0 * CHORD_ERROR / bend), CORNER / bend, at_speed]), LEAST_GAP
