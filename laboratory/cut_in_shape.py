@@ -22,6 +22,7 @@ from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
 import xosc_lateral as xl
 from xosc_lateral.extras.detect.tracks import in_lanes
+from xosc_lateral.extras.recordings.lane_order import RoadLanes
 from xosc_lateral.extras.recordings.maneuvers import changes_of
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
@@ -29,7 +30,6 @@ from xosc_lateral.workflows.batch.request import Request, concrete, document_kin
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.motion.nominal import EntityMotion
-from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 FloatArray = NDArray[np.float64]
 

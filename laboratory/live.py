@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.profiles.profiles import read_profile
-from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
 DT, LENGTH, LANES, WIDTH = 0.01, 20_000.0, 3, 3.6
 

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from xosc_lateral.extras.live.esmini import EsminiTraffic
-from xosc_lateral.files.esmini_library import Player, open_player
+from xosc_lateral.extras.live.esmini_library import Player, open_player
 from xosc_lateral.files.openscenario.read import read_scenario
 
 STEP, EVERY = 0.01, 5

@@ -17,11 +17,11 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.maneuvers import Maneuvers
+from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
 from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.files.profiles import read_profile, write_profile
-from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 HALVES = 20

@@ -35,8 +35,8 @@ from tests.kit.scenario_files import (
     time_condition,
 )
 from xosc_lateral.base.plugins import shipped_folder
+from xosc_lateral.extras.live.moment import Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
-from xosc_lateral.world.surroundings.moment import Places
 
 LANE = '<lane id="-{k}" type="driving">{link}<width sOffset="0" a="3.6" b="0" c="0" d="0"/></lane>'
 LINKED = '<link><predecessor id="-{k}"/><successor id="-{k}"/></link>'

@@ -45,11 +45,11 @@ from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
 from xosc_lateral.extras.detect.tracks import STEP, Scene
 from xosc_lateral.extras.detect.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
+from xosc_lateral.extras.recordings.lane_order import RoadLanes
 from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 FloatArray = NDArray[np.float64]
 

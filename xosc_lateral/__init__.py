@@ -27,12 +27,10 @@ _HOME = {
     "compare_profiles": "workflows.profiles.profiles",
     "list_templates": "workflows.playing.templates",
     "write_template": "workflows.playing.templates",
-    "vary": "workflows.playing.vary",
     "OffsetStream": "drivers.model.stream",
     "DriverProfile": "drivers.model.profile",
     "Drive": "drivers.drives.drive",
     "Conversion": "workflows.conversion.conversion",
-    "Variations": "workflows.playing.vary",
     "ConvertSettings": "workflows.conversion.settings",
     "BatchResult": "workflows.batch.call",
     "Verification": "workflows.batch.verify",
@@ -129,6 +127,7 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.detect.call import detect
     from xosc_lateral.extras.detect.detection import Detection
     from xosc_lateral.extras.detect.sight import Sight
+    from xosc_lateral.extras.detect.vary import Variations, vary
     from xosc_lateral.extras.dossier.call import Dossier, dossier
     from xosc_lateral.extras.live.c_driver import export_c
     from xosc_lateral.extras.live.call import LiveRun, live_esmini, live_sumo
@@ -148,7 +147,6 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
-    from xosc_lateral.workflows.playing.vary import Variations, vary
     from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check

@@ -92,7 +92,7 @@ def _use_commonroad(path: Path) -> None:
 
 
 def _osi_files(folder: Path) -> Iterable[Path]:
-    from tests.files.osi.test_read import drives, saved
+    from tests.extras.recordings.test_osi_read import drives, saved
 
     return [saved(folder / "trace.mcap", drives()[:200]), saved(folder / "trace_gt.osi", drives()[:200])]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.extras.live.esmini import LATERAL_ACTIONS
-from xosc_lateral.files.esmini_library import ObjectState
+from xosc_lateral.extras.live.esmini_library import ObjectState
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import Activity
 from xosc_lateral.world.scenario.private_actions import FollowTrajectoryAction

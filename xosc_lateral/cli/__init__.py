@@ -34,7 +34,6 @@ VERBS = {
     "evaluate": "Score a profile on measured drives.",
     "profiles": "The library of driver profiles.",
     "template": "Scenarios to start from.",
-    "vary": "A scenario's lane changes as long as real ones.",
 }
 for _name, (_, _does, _before, _) in offered("VERBS").items():
     _first = [*VERBS].index(_before) if _before else len(VERBS)
@@ -43,7 +42,7 @@ for _name, (_, _does, _before, _) in offered("VERBS").items():
 
 VERB_MODULES = {
     "check": "fit", "sample": "fit", "evaluate": "fit", "verify": "convert", "reproduce": "convert", "states": "play",
-    "view": "play", "segments": "play", "template": "play", "vary": "play",
+    "view": "play", "segments": "play", "template": "play",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 

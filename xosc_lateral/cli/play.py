@@ -175,22 +175,3 @@ def write(
     chosen: dict[str, str] = pairs(settings, "--set")
     written = xl.write_template(name, output, force=reply.force, **chosen)
     reply.say_written(written, template=name, settings=chosen)
-
-
-@command(
-    app, "vary", VERBS["vary"],
-    "vary cut-in.xosc --like motorway -n 200 -o varied/", "convert varied/cut-in-like-motorway.xosc -o out/",
-)
-def vary(
-    scenario: Scenario, *,
-    output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
-    options: Annotated[Options, xl.vary],
-    reply: Written,
-) -> None:
-    """Write variations of a scenario in which lane changes last as long as those of a profile's drivers.
-
-    Drawn are durations (rates, where those are stated), for the gap to the vehicle ahead; with --speeds, changes of
-    speed. Who changes lanes, when and where to stays the scenario's: neither gaps nor how often are drawn, nor lane
-    changes that are given up. What is shorter than real drivers take is varied about itself.
-    """
-    reply.say(xl.vary(scenario, output, **options, force=reply.force))

@@ -30,7 +30,7 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.extras.live.call import live_esmini
 from xosc_lateral.extras.live.esmini import EsminiTraffic, lateral_actions
-from xosc_lateral.files.esmini_library import ObjectState, Player, open_player
+from xosc_lateral.extras.live.esmini_library import ObjectState, Player, open_player
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.motion.driver_clock import LARGEST_TURN_RATE

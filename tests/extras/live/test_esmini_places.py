@@ -13,7 +13,7 @@ import pytest
 
 from xosc_lateral.extras.live.call import LiveRun, live_esmini
 from xosc_lateral.extras.live.esmini import EsminiTraffic
-from xosc_lateral.files.esmini_library import open_player
+from xosc_lateral.extras.live.esmini_library import open_player
 from xosc_lateral.workflows.profiles.profiles import read_profile
 
 CASES = Path(__file__).resolve().parents[4] / "shared" / "cases" / "live"

@@ -16,12 +16,12 @@ from xosc_lateral.base.rates import rate
 from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW, Course
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, views_of
 from xosc_lateral.extras.detect.sources import SourceSettings, sources_of
+from xosc_lateral.extras.live.moment import OpenDriveRoads, Places, look_around
 from xosc_lateral.extras.recordings.reconstruct import Reconstruction
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.context import entity_context
-from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places, look_around
 
 LENGTH, LANE, BEGIN, DURATION = 4.5, 3.5, 20.0, 5.0
 PEAK = 0.5 * np.pi * LANE / DURATION  # of the lateral speed [m/s]

@@ -13,7 +13,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.extras.recordings.importers.track_table import read_esmini_log
 from xosc_lateral.extras.recordings.importers.tracks import Strip, graph_of_shapes, import_tracks
-from xosc_lateral.world.surroundings.lane_order import LaneGraph
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
 
 WIDTH = 3.5
 HEADING = 0.3

@@ -19,10 +19,10 @@ from xosc_lateral.extras.detect.observation import Sensor, View, views_of
 from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of
 from xosc_lateral.extras.detect.sources import SourceSettings, converted, played_scene
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
+from xosc_lateral.extras.detect.vary import Variations, vary
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.batch.request import Request, concrete, document_kind
-from xosc_lateral.workflows.playing.vary import Variations, vary
 from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene, in_lanes, tracks_of
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH
+from xosc_lateral.extras.recordings.lane_order import RoadLanes
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import (
     REAR_AXLE,
@@ -37,7 +38,6 @@ from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.workflows.result import GivenDrives, given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.player.player import play
-from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 
 @dataclass(frozen=True, eq=False, slots=True)

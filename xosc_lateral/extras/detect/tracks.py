@@ -13,10 +13,10 @@ from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.track import Column, lane_levels
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course
 from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS
+from xosc_lateral.extras.recordings.lane_order import Order, RoadLanes, in_groups
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.segments import ACROSS_LANE
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.lane_order import Order, RoadLanes, in_groups
 
 STEP = 0.05
 """Of everything that a detector sees: the rate of 20 Hz at which radar and camera object lists come. [s]"""

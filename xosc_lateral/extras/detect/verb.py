@@ -1,4 +1,4 @@
-"""`xosc-lateral detect`: what cut-in detectors do on scenarios and on measured traffic."""
+"""`xosc-lateral detect` and `vary`: what cut-in detectors do, on families of cut-ins and on measured traffic."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
+from xosc_lateral.cli.play import Scenario
 from xosc_lateral.cli.words import Options, Written, command, naming_option
 
 # What is said of one option stays together.
@@ -48,3 +49,22 @@ def detect(
     reply.say(result)
     if not getattr(result, "is_set", True):  # what was asked for could not be had, and is said above
         raise typer.Exit(1)
+
+
+@command(
+    app, "vary", VERBS["vary"],
+    "vary cut-in.xosc --like motorway -n 200 -o varied/", "convert varied/cut-in-like-motorway.xosc -o out/",
+)
+def vary(
+    scenario: Scenario, *,
+    output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
+    options: Annotated[Options, xl.vary],
+    reply: Written,
+) -> None:
+    """Write variations of a scenario in which lane changes last as long as those of a profile's drivers.
+
+    Drawn are durations (rates, where those are stated), for the gap to the vehicle ahead; with --speeds, changes of
+    speed. Who changes lanes, when and where to stays the scenario's: neither gaps nor how often are drawn, nor lane
+    changes that are given up. What is shorter than real drivers take is varied about itself.
+    """
+    reply.say(xl.vary(scenario, output, **options, force=reply.force))

@@ -25,3 +25,5 @@ CALLS = {
     "export_fmu": "xosc_lateral.extras.live.fmu",
     "LiveRun": "xosc_lateral.extras.live.call",
 }
+SERVICES = {"told_by_player": "xosc_lateral.extras.live.user_player"}
+"""What `convert --player-library` has this extra do."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, notes, warnings
+from xosc_lateral.base.plugins import service
 from xosc_lateral.extras.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import RECOGNISED_BY
@@ -59,8 +60,8 @@ def live_esmini(
     `SimulationError` or `FormatError` in one line.
     """
     from xosc_lateral.extras.live.esmini import EsminiTraffic
+    from xosc_lateral.extras.live.esmini_library import open_player
     from xosc_lateral.extras.live.scene import SimulatorScene
-    from xosc_lateral.files.esmini_library import open_player
     from xosc_lateral.workflows.conversion.result import Neighbours
 
     chosen = given_profile(profile, folders)
@@ -206,7 +207,6 @@ class LiveRun(Result):
         """
         from xosc_lateral.extras.live.scene import motion_of
         from xosc_lateral.files.osi import SUFFIXES
-        from xosc_lateral.files.osi.write import write_osi
         from xosc_lateral.world.scenario.controllers import is_named_under_test
 
         output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
@@ -215,4 +215,5 @@ class LiveRun(Result):
         motion = motion_of(self._rows, self._scene, network)
         names = (entity.name for entity in motion.entities if is_named_under_test(entity.name))
         host = next(iter((*self._scene.ego, *names)), None)
-        return write_osi(output, motion, network, host=host, description=self.headline())
+        service("write_osi")(output, motion, network, host=host, description=self.headline())
+        return output

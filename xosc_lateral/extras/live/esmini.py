@@ -18,12 +18,13 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.extras.live.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, Place, Rest, ToldPlace
 from xosc_lateral.extras.live.loop import Row
+from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
 from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, left_of_gap
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.extras.live.under_test import UnderTest
-from xosc_lateral.files.esmini_library import ObjectState, Player, StoryboardCallback
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours
@@ -38,7 +39,6 @@ from xosc_lateral.world.scenario.private_actions import (
 )
 from xosc_lateral.world.scenario.scenario import Scenario
 from xosc_lateral.world.surroundings.around import smooth_step
-from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places
 
 LATERAL_ACTIONS = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""

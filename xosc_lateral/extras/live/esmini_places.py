@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from xosc_lateral.extras.live.esmini_library import ObjectState
 from xosc_lateral.extras.live.paths import STANDSTILL
-from xosc_lateral.files.esmini_library import ObjectState
 from xosc_lateral.world.road.network import RoadNetwork
 
 LANE_STEP = 0.5

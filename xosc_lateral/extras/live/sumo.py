@@ -20,18 +20,18 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import SimulationError
+from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.loop import Row
+from xosc_lateral.extras.live.moment import Places
 from xosc_lateral.extras.live.paths import Moves
 from xosc_lateral.extras.live.scene import CATEGORY_OF_CLASS, sumo_entity
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.extras.live.under_test import UnderTest
-from xosc_lateral.files.sumo import is_left_handed
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, LaneStretch
 from xosc_lateral.world.surroundings.context import TRUCKS
-from xosc_lateral.world.surroundings.moment import Places
 
 HOLD_TIME = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""
@@ -77,7 +77,7 @@ class SumoRoads:
     def __init__(self, connection: Any) -> None:
         self._lane = connection.lane
         net = Path(str(connection.simulation.getOption("net-file")))
-        self.left_hand = net.is_file() and is_left_handed(net)
+        self.left_hand = net.is_file() and service("is_left_handed")(net)
         self.side = -1.0 if self.left_hand else 1.0
         self.names: list[str] = list(connection.lane.getIDList())
         edges = [name.rpartition("_")[0] for name in self.names]

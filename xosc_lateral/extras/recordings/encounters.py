@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.extras.recordings.lane_order import ENCOUNTER_DISTANCE, At, RoadLanes
 from xosc_lateral.extras.recordings.plan import VehiclePlan
-from xosc_lateral.world.surroundings.lane_order import ENCOUNTER_DISTANCE, At, RoadLanes
 
 BRAKING_DECELERATION = 1.0  # from which it is braking: coasting in gear gives about 0.5 at 100 km/h [m/s2]
 SURE_RATE = 1.0  # a distance that passes its value more slowly is no trigger: 0.1 m of error is more than 0.1 s [m/s]

@@ -12,12 +12,12 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.fitting.maneuvers import SIDES, MeasuredChanges, fit_maneuvers
 from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, Maneuvers
+from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
 from xosc_lateral.extras.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.workflows.result import PathLike
 from xosc_lateral.world.motion.nominal import EntityMotion
-from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
 BEFORE = np.arange(-8.0, 0.5 * BEFORE_STEP, BEFORE_STEP)
 """Moments of the way before a lane change. [s]"""

@@ -29,6 +29,7 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.recordings.encounters import encounters, relative_triggers
+from xosc_lateral.extras.recordings.lane_order import RoadLanes
 from xosc_lateral.extras.recordings.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.extras.recordings.reconstruction import ChosenDriver, Reconstruction
 from xosc_lateral.extras.recordings.recorded import RecordedTrack, place_tracks
@@ -41,7 +42,6 @@ from xosc_lateral.workflows.conversion.settings import AUTO_PROFILE
 from xosc_lateral.workflows.opened import opened_as_one
 from xosc_lateral.workflows.options import spelled_out, values_of
 from xosc_lateral.workflows.result import PathLike
-from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
 LONG_DRIVE = 100.0  # of road-following, for a profile of one vehicle: ten windows that the evaluation compares [s]
 LONGEST_WINDOW = 3600.0  # a scenario of more can't be looked at, and times in ms or us instead of s give it [s]

@@ -18,19 +18,19 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
 from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
+from xosc_lateral.extras.recordings.sumo import read_sumo_net
 from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.source import read_source
-from xosc_lateral.files.sumo import read_sumo_net
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import root_tag
 from xosc_lateral.world.motion.nominal import made_vehicle
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.lane_order import LaneGraph
 
 STEP = 0.1  # rows are thinned to this: lane changes and braking last seconds [s]
 REAR_AXLE = 0.3  # middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m [-]

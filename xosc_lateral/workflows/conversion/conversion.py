@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.profile import SIDES, UNMEASURED_RESPONSES, Basis
 from xosc_lateral.files.atomic import together
 from xosc_lateral.files.output_paths import claim, label_files, output_file
@@ -161,7 +162,6 @@ class Conversion(ConvertedScenario, Result):
         tuple of Path
             The two files: ``.mcap`` or ``.osi``, one `GroundTruth` per step.
         """
-        from xosc_lateral.files.osi.write import write_osi
 
         enriched, nominal = outputs = osi_files(path, self.source)
         claim(outputs, [self.source], force=force)
@@ -171,8 +171,8 @@ class Conversion(ConvertedScenario, Result):
         paths = [entity.trajectory for entity in made.entities]
         nominal_words = f"{self.source.name}, as its maneuvers say"
         with together():
-            write_osi(enriched, made.motion, made.network, paths, host=host, description=words)
-            write_osi(nominal, made.motion, made.network, host=host, description=nominal_words)
+            service("write_osi")(enriched, made.motion, made.network, paths, host=host, description=words)
+            service("write_osi")(nominal, made.motion, made.network, host=host, description=nominal_words)
         return outputs
 
     def write_image(self, path: PathLike, at: float | None = None, *, force: bool = False) -> Path:

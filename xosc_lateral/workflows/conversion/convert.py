@@ -17,6 +17,7 @@ from msgspec import structs
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.note import notes, warnings
+from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import together, write_atomically
@@ -36,7 +37,6 @@ from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
-from xosc_lateral.workflows.conversion.user_player import told_by_player
 from xosc_lateral.workflows.conversion.write import Written, write, write_with
 from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
@@ -256,7 +256,7 @@ def check(plan: Plan, written: Written, first: Look) -> Written:
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
     warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
     if settings.player_library is not None:
-        warned += told_by_player(
+        warned += service("told_by_player")(
             settings.player_library, plan.source, (plan.output, best.file.data or b""), equivalence.runs,
             plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),

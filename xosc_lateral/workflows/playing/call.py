@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, notes
+from xosc_lateral.base.plugins import service
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import file_hash, parsed_hashes
 from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
@@ -241,14 +242,15 @@ class Playback(Result):
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
         from xosc_lateral.files.osi import SUFFIXES
-        from xosc_lateral.files.osi.write import write_osi
         from xosc_lateral.world.scenario.controllers import vehicles_under_test
 
         output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
         claim([output], self.files, force=force)
         motion, network = self._played.motion, self._played.network
         host = next(iter(vehicles_under_test(self._played.scenario)), None)
-        return write_osi(output, motion, network, host=host, description=f"{self.scenario.name}, as its maneuvers say")
+        words = f"{self.scenario.name}, as its maneuvers say"
+        service("write_osi")(output, motion, network, host=host, description=words)
+        return output
 
     @property
     def files(self) -> list[Path]:

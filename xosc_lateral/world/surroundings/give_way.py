@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.around import pairs_now, smooth_step, stretches_within
+from xosc_lateral.world.surroundings.around import smooth_step, stretches_within
 from xosc_lateral.world.surroundings.context import ROWS_TOGETHER, STEERING_DURATION
-from xosc_lateral.world.surroundings.moment import Places
 
 GAP_QUANTILES = (
     np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),
@@ -125,38 +124,6 @@ def give_way(
         aside = left[k] - right[k]
         result.append(_smoothed(aside, smoothed) if aside.any() else None)
     return result
-
-
-def give_way_now(
-    places: Places,
-    lateral: FloatArray,
-    deviation: FloatArray,
-    can_move: BoolArray,
-    response: Response,
-    *,
-    left_hand: bool,
-) -> FloatArray:
-    """The same at one moment, shape (n,), of drivers who respond at once. [m]
-
-    `lateral` and `deviation` from the lane's centre, as it is and without what one has moved aside, 0 in a maneuver
-    [m]; `can_move`: there is a driver, who follows the road; shape (n,) each.
-    """
-    n = len(places.x)
-    cos, sin = np.cos(places.heading), np.sin(places.heading)
-    x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
-    a, b = pairs_now(x, y, FADE_DISTANCE + float(places.length.max(initial=0.0)) + REACH_MARGIN)
-    apart = places.apart(a, b)
-    a, b = a[apart], b[apart]
-    vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
-    vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
-    x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
-    columns = (x, y, places.heading, deviation, can_move, places.length, places.width)
-    first, second = (BodyFrame._make(column[one] for column in columns) for one in (vehicle, other))
-    aside = moved_aside(first, second, Response._make(column[vehicle] for column in response), left_hand)
-    left, right = np.zeros((2, n))
-    np.maximum.at(right, vehicle, np.maximum(0.0 - aside, 0.0))
-    np.maximum.at(left, vehicle, np.maximum(aside, 0.0))
-    return left - right
 
 
 def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntArray, IntArray]]:

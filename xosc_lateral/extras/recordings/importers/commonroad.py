@@ -30,10 +30,10 @@ from xosc_lateral.extras.recordings.importers.tracks import (
     place_in_shapes,
     require_lanes,
 )
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.files.xml import read_xml, root_tag
-from xosc_lateral.world.surroundings.lane_order import LaneGraph
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
 

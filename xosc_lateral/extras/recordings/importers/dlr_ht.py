@@ -47,10 +47,10 @@ from xosc_lateral.extras.recordings.cuts import (
 )
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
+from xosc_lateral.extras.recordings.neighbours import find_neighbours
 from xosc_lateral.extras.recordings.reference_line import ReferenceLine, fit_reference_line
 from xosc_lateral.files.source import open_source
 from xosc_lateral.workflows.options import flag
-from xosc_lateral.world.surroundings.lane_order import find_neighbours
 
 LANE_COUNT = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]

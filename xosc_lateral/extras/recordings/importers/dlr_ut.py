@@ -33,9 +33,9 @@ from xosc_lateral.extras.recordings.importers.tracks import (
     place_in_shapes,
     require_lanes,
 )
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.streams import lanes_of_streams, streams, strip_about
 from xosc_lateral.workflows.options import flag
-from xosc_lateral.world.surroundings.lane_order import LaneGraph
 
 DATA_SET, VERSION = "DLR-Urban-Traffic", "1.2.0"
 LICENCE = (

@@ -23,13 +23,14 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import ON_ROADS, TRUCKS, class_named
 from xosc_lateral.drivers.drives.identity import identify
+from xosc_lateral.extras.recordings import sumo
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of_rows
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
+from xosc_lateral.extras.recordings.neighbours import neighbour_columns
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane
-from xosc_lateral.files import sumo
 from xosc_lateral.workflows.options import flag
-from xosc_lateral.world.surroundings.lane_order import LaneGraph, neighbour_columns
 
 LICENCE = "that of the simulation"
 ROW_COLUMNS = ("time", "name", "lane", "pos", "side", "speed", "kind", "x", "y", "angle")

@@ -34,9 +34,10 @@ from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
+from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE
+from xosc_lateral.extras.recordings.neighbours import find_neighbours
 from xosc_lateral.files.mapping import classes_of
 from xosc_lateral.files.tables import read_table
-from xosc_lateral.world.surroundings.lane_order import NEIGHBOUR_DISTANCE, find_neighbours
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "

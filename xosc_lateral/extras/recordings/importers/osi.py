@@ -30,11 +30,11 @@ from xosc_lateral.extras.recordings.importers.tracks import (
     place_on_road,
     require_lanes,
 )
+from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.osi_trace import Recorded, read_osi
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.osi import osi
 from xosc_lateral.workflows.options import flag
-from xosc_lateral.world.surroundings.lane_order import LaneGraph
 
 LICENCE = "that of the trace"
 HOST = "host"  # stands for the trace's own host vehicle

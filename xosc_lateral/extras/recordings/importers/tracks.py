@@ -34,11 +34,12 @@ from xosc_lateral.extras.recordings.cuts import (
 )
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, read_tracks
+from xosc_lateral.extras.recordings.lane_order import LaneGraph, RoadLanes
+from xosc_lateral.extras.recordings.neighbours import neighbour_columns
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.workflows.options import MAPPING, flag
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.lane_order import LaneGraph, RoadLanes, neighbour_columns
 
 LICENCE = "your own recording"
 CURVATURE_WINDOW = 20.0  # way over which a lane's turning is averaged into a curvature: bounds are polygons [m]

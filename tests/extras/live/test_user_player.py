@@ -11,8 +11,8 @@ import pytest
 
 import xosc_lateral as xl
 from tests.kit.made.reactive import reactive_scenarios
+from xosc_lateral.extras.live.user_player import _otherwise, happens, told_by_player
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.workflows.conversion.user_player import _otherwise, happens, told_by_player
 
 REAL = os.environ.get("ESMINI_LIBRARY")
 needs_esmini = pytest.mark.skipif(not REAL, reason="ESMINI_LIBRARY names no library of esmini")

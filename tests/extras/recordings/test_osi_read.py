@@ -11,13 +11,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from tests.files.osi.test_write import messages
+from tests.extras.recordings.test_osi_write import messages
 from tests.kit.motion import RADIUS, drive, entity, together, two_roads
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.extras.recordings.importers import import_drives
 from xosc_lateral.extras.recordings.osi_trace import NANOSECONDS, PLACES, ROW_COLUMNS
-from xosc_lateral.files.osi.write import write_osi
+from xosc_lateral.extras.recordings.osi_write import write_osi
 from xosc_lateral.world.scenario.enums import VehicleCategory
 
 osi_utilities = pytest.importorskip("osi_utilities")

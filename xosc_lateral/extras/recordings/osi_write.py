@@ -17,9 +17,9 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.track import Track
 from xosc_lateral.base.version import __version__
+from xosc_lateral.extras.recordings.osi_lanes import RoadIds, write_lanes
 from xosc_lateral.files.atomic import replace_atomically
 from xosc_lateral.files.osi import SUFFIXES, osi
-from xosc_lateral.files.osi.lanes import RoadIds, write_lanes
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic, axes
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import Entity

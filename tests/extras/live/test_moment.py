@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from tests.kit.motion import drive, entity, together, two_roads
+from xosc_lateral.extras.live.moment import OpenDriveRoads, Places, give_way_now, look_around
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario.enums import VehicleCategory
 from xosc_lateral.world.surroundings.context import entity_context
-from xosc_lateral.world.surroundings.give_way import Response, SampledVehicle, give_way, give_way_now
-from xosc_lateral.world.surroundings.moment import OpenDriveRoads, Places, look_around
+from xosc_lateral.world.surroundings.give_way import Response, SampledVehicle, give_way
 
 
 def traffic(network, seed: int, n: int = 24, **changes) -> NominalMotion:

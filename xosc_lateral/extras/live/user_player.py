@@ -14,8 +14,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.note import Note
+from xosc_lateral.extras.live.esmini_library import StoryboardCallback, open_player
 from xosc_lateral.files.apart import apart
-from xosc_lateral.files.esmini_library import StoryboardCallback, open_player
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, later
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork

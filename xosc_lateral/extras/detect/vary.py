@@ -144,8 +144,8 @@ def _drawn(
     replaces: bool,
 ) -> _Drawn:  # fmt: skip
     """Draw; the draft's lane changes refer to these parameters."""
+    from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
     from xosc_lateral.files.openscenario.references import parameter_name
-    from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
 
     changes, lanes = _lane_changes(draft, played), RoadLanes(played.network)
     declarations = draft.root.find("{*}ParameterDeclarations")
@@ -260,7 +260,7 @@ class Follower(NamedTuple):
 
 def _closest(runs: list[Played]) -> dict[str, Follower]:
     """By vehicle that changes lanes."""
-    from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
+    from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
 
     followers = dict[str, Follower]()
     for played in runs:

@@ -11,7 +11,7 @@ import pytest
 
 from tests.kit.motion import STEP, drive, entity, together, two_roads
 from xosc_lateral.cli import main
-from xosc_lateral.files.osi.write import write_osi
+from xosc_lateral.extras.recordings.osi_write import write_osi
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion, PlayedAction
 from xosc_lateral.world.motion.trajectory import displace
 from xosc_lateral.world.road.network import RoadNetwork

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.stage import Stage, maneuvers, on_lane, speed, teleport
-from xosc_lateral.world.surroundings.lane_order import RoadLanes, vehicle_next
+from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
 
 
 def test_the_follower_closes_when_he_is_the_faster_one(tmp_path: Path) -> None:

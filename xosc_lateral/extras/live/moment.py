@@ -15,6 +15,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings import around
 from xosc_lateral.world.surroundings.context import lanes_beside, road_columns, spread_out
+from xosc_lateral.world.surroundings.give_way import FADE_DISTANCE, REACH_MARGIN, BodyFrame, Response, moved_aside
 
 
 class Roads(Protocol):
@@ -143,3 +144,35 @@ def _along_paths(
         pairs = slice(ends[number], ends[number + 1])
         if pairs.start < pairs.stop:
             yield path, u, vehicle[pairs], other[pairs]
+
+
+def give_way_now(
+    places: Places,
+    lateral: FloatArray,
+    deviation: FloatArray,
+    can_move: BoolArray,
+    response: Response,
+    *,
+    left_hand: bool,
+) -> FloatArray:
+    """How far each moves aside from those beside it, as `give_way` says, at once: positive left, shape (n,). [m]
+
+    `lateral` and `deviation` from the lane's centre, as it is and without what one has moved aside, 0 in a maneuver
+    [m]; `can_move`: there is a driver, who follows the road; shape (n,) each.
+    """
+    n = len(places.x)
+    cos, sin = np.cos(places.heading), np.sin(places.heading)
+    x, y = (axis + places.center_x * part for axis, part in ((places.x, cos), (places.y, sin)))
+    a, b = around.pairs_now(x, y, FADE_DISTANCE + float(places.length.max(initial=0.0)) + REACH_MARGIN)
+    apart = places.apart(a, b)
+    a, b = a[apart], b[apart]
+    vehicle, other = np.concatenate([a, b]), np.concatenate([b, a])
+    vehicle, other = vehicle[can_move[vehicle]], other[can_move[vehicle]]
+    x, y = x + lateral * sin, y - lateral * cos  # on the lane's centre line, from which a deviation counts
+    columns = (x, y, places.heading, deviation, can_move, places.length, places.width)
+    first, second = (BodyFrame._make(column[one] for column in columns) for one in (vehicle, other))
+    aside = moved_aside(first, second, Response._make(column[vehicle] for column in response), left_hand)
+    left, right = np.zeros((2, n))
+    np.maximum.at(right, vehicle, np.maximum(0.0 - aside, 0.0))
+    np.maximum.at(left, vehicle, np.maximum(aside, 0.0))
+    return left - right
