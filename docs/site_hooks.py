@@ -50,7 +50,7 @@ def limits() -> str:
     """Every limit of input files, as the code has it."""
     from xosc_lateral.base.limits import limits_table
 
-    intro = "Beyond one of these, one line says so. Only `--job-timeout` and `--job-memory` can be changed."
+    intro = "Beyond one of these, one line says so. Only those of `--job-limit` can be changed."
     return f"# Limits of input files\n\n{intro}\n\n{limits_table()}\n"
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.base.plugins import shipped_folder
-from xosc_lateral.cli import main
+from xosc_lateral.cli import GONE, main
 
 
 @pytest.fixture
@@ -290,21 +290,9 @@ def test_a_damaged_table_is_refused_in_words_of_our_own(tmp_path, capsys, name, 
     assert err.count("\n") == 1 and not re.search("footer|parse|end-of-stream|C error|codec", err), err
 
 
-def test_last_releases_words_are_known(
-    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(scenario.parent)
-    written = []
-    for verb, player, enrich, attempts in (
-        ("play", "--for", "--only", "--resample"),
-        ("states", "--player", "--enrich", "--attempts"),
-    ):
-        assert main([verb, "cut-in.xosc", "-o", "s.csv", "--time-limit", "1", "-q"]) == 0
-        words = [player, "esmini", f"{enrich}=Ego", attempts, "2", "--ego", "none", "--time-limit", "1", "-q"]
-        assert main(["convert", "cut-in.xosc", "-o", "c.xosc", *words]) == 0
-        written.append([Path(name).read_bytes() for name in ("s.csv", "c.xosc")])
-        told = [line for line in capsys.readouterr().err.splitlines() if "is called" in line]
-        assert len(told) == (4 if verb == "play" else 0)
-    assert written[0] == written[1]
-    assert main(["convert", "-o", "out/", "--", "cut-in.xosc", "--for", "esmini"]) != 0  # files of these names
-    assert "--for" in capsys.readouterr().err
+def test_what_went_says_what_takes_its_place(capsys: pytest.CaptureFixture[str]) -> None:
+    for option, today in GONE.items():
+        assert main(["convert", "cut-in.xosc", option, "x"]) == 2
+        assert f"{option} is {today} now" in capsys.readouterr().err
+    assert main(["play", "cut-in.xosc"]) == 2
+    assert "'states' does that" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,3 +52,8 @@ def test_every_option_is_taught() -> None:
         if not any(re.search(rf"{re.escape(name)}(?![\w-])", text) for name in names)
     }
     assert not missing
+
+
+def test_no_verb_has_more_than_thirty() -> None:
+    counted = Counter(verb for verb, _ in options())
+    assert max(counted.values()) <= 30, counted.most_common(3)

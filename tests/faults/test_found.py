@@ -208,7 +208,7 @@ def test_a_product_of_many_parts_comes_one_by_one():
 def test_the_lock_is_an_event_where_the_log_is_json(tmp_path, capsys):
     write_template("cut-in", tmp_path / "in")
     with folder_lock(tmp_path / "out" / STATE_FOLDER / "lock"):
-        assert main(["convert", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--log-json"]) == 1
+        assert main(["convert", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--json", "-v"]) == 1
     event = json.loads(capsys.readouterr().err.splitlines()[-1])
     assert event["event"] == "error" and "another run" in event["error"]["message"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from signal import SIGINT
@@ -46,11 +46,13 @@ VERB_MODULES = {
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
 
-OLD_VERBS = {"play": "states"}
-"""What was the name of a verb in 0.2 -> its name."""
-
-OLD_OPTIONS = {"convert": {"--for": "--player", "--resample": "--attempts", "--only": "--enrich"}}
-"""Verb -> what was the name of an option of it in 0.2 -> its name."""
+GONE = {
+    "--osi": "--report FILE.mcap", "--summary": "--report FILE.md", "--jam-corridor": "--with jam-corridor",
+    "--entity": "-p NAME=PROFILE", "--road-path": "--road FOLDER", "--cluster": "--jobs ADDRESS",
+    "--player-library": "--player LIBRARY", "--job-timeout": "--job-limit 600s", "--job-memory": "--job-limit 4000MB",
+    "--log-json": "--json --verbose", "--for": "--player", "--resample": "--attempts", "--only": "--enrich",
+}  # fmt: skip
+"""What was an option of `convert` or of others -> what takes its place."""
 
 TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
@@ -109,26 +111,8 @@ class _Verbs(TyperGroup):
         self.commands = {name: TyperCommand(name, short_help=does) for name, does in VERBS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        word = _today(args[0], OLD_VERBS)
-        name, known, rest = super().resolve_command(ctx, [word, *args[1:]])
-        return name, known and verb(str(name)), [*_renamed(rest, OLD_OPTIONS.get(word, {}))]
-
-
-def _renamed(words: Sequence[str], names: Mapping[str, str]) -> Iterator[str]:
-    """Options by today's names; whatever comes behind `--` is none."""
-    for k, word in enumerate(words):
-        if word == "--":
-            yield from words[k:]
-            return
-        option, equals, value = word.partition("=")
-        yield _today(option, names) + equals + value
-
-
-def _today(word: str, names: Mapping[str, str]) -> str:
-    """A word by its name of today; a former one is named on standard error."""
-    if word in names:
-        print(f"xosc-lateral: warning: {word} is called {names[word]} now, and will be unknown next", file=sys.stderr)
-    return names.get(word, word)
+        name, known, rest = super().resolve_command(ctx, args)
+        return name, known and verb(str(name)), rest
 
 
 app = typer.Typer(
@@ -159,10 +143,11 @@ def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
 SIBLINGS = {
     "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
     "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
-    "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"), "verify": ("diff", "status"),
-    "profiles list": ("list", "profile", "library", "list-profiles"), "template write": ("new", "write-template"),
-    "template list": ("templates", "list-templates"), "convert SCENARIO... or FOLDER": ("convert-many",),
-    "import": ("import-drives", "read-drives"), "close-loop": ("loop", "identify", "refine", "plan-loop"),
+    "states": ("play",), "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"),
+    "verify": ("diff", "status"), "profiles list": ("list", "profile", "library", "list-profiles"),
+    "template write": ("new", "write-template"), "template list": ("templates", "list-templates"),
+    "convert SCENARIO... or FOLDER": ("convert-many",), "import": ("import-drives", "read-drives"),
+    "close-loop": ("loop", "identify", "refine", "plan-loop"),
 }  # fmt: skip
 """Verb -> what others call it, Python's calls among them."""
 
@@ -176,6 +161,7 @@ def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     elif first not in VERBS and not first.startswith("-"):
         name = first.replace("_", "-").lower()
         yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
+    yield from (f"{old} is {new} now" for old, new in GONE.items() if f"No such option: {old}" in wrong)
     if "'--profile'" in wrong and "Missing" in wrong:
         yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
     if "not a valid float" in wrong:
@@ -194,7 +180,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             code = 0
         else:
             line = in_terminal(f"xosc-lateral: {' '.join(_in_words(error).split())}")
-            if "--log-json" in words:
+            if "--json" in words and {"-v", "--verbose"} & {*words}:
                 line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
             print(line, file=sys.stderr)
             if "--json" in words:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Osi, Printing, Written, command, say, say_json, warn, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, warn, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
@@ -44,7 +44,7 @@ class _WithPanels(TyperCommand):
     app, "convert", VERBS["convert"],
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
-    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-1 | grep Vertex",
+    "convert cut-in.xosc -o - -p Truck=motorway-vehicle-1 | grep Vertex",
     cls=_WithPanels,
 )
 def convert(
@@ -56,11 +56,10 @@ def convert(
         help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder.")] = None,
     settings: Annotated[Options, ConvertSettings],
     batch: Annotated[Options, xl.convert_many],
-    osi: Osi = None,
-    summary: Annotated[str | None, typer.Option(metavar="FILE.md",
-        help="Markdown with the numbers and two pictures, for a pull request.")] = None,
-    log_json: Annotated[bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.",
-        rich_help_panel="Batches")] = False,
+    report: Annotated[list[str] | None, typer.Option(metavar="FILE",
+        help="What was added, by the file's ending: page (.html), Markdown with the numbers and two pictures for a "
+        "pull request (.md), ASAM OSI trace with lanes, boxes and motion (.mcap, .osi; extra osi). May be repeated. "
+        "Of a batch: a folder of pages.")] = None,
     reply: Written,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
@@ -70,19 +69,19 @@ def convert(
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
-    report = batch.get("report")
     places = scenarios_at(scenario[0]) if is_url(scenario[0]) else scenario
     if len(places) == 1 and is_single(places[0]) and batch.get("shard") is None:
-        limits = JobLimits(batch["job_timeout"], batch["job_memory"])
-        with sent_back(output, report, osi, summary) as outputs:
-            _convert_one(Path(places[0]), outputs, options, limits, batch["variants"], reply, labels=batch["labels"])
+        limits = JobLimits(**{name.removeprefix("job_"): batch[name] for name in batch if name.startswith("job_")})
+        with sent_back(output, *(report or ())) as (target, *files):
+            reports = _reports([text for text in files if text is not None])
+            _convert_one(
+                Path(places[0]), target, reports, options, limits, batch["variants"], reply, labels=batch["labels"]
+            )
         return
-    for option, stated in (("--osi", osi), ("--summary", summary)):
-        if stated is not None:
-            raise typer.BadParameter("is written for a single scenario", param_hint=option)
-    if report is not None and Path(report).is_file():
-        raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
-    options |= {**batch, "show": "json" if log_json else "quiet" if reply.quiet else "auto"}
+    folder = next(iter(report or ()), None)
+    if folder is not None and (len(report or ()) > 1 or Path(folder).is_file() or set(_reports([folder])) != {"page"}):
+        raise typer.BadParameter("of a batch: one folder of pages", param_hint="--report")
+    options |= {**batch, "report": folder, "show": "quiet" if reply.quiet else "json" if reply.logs_json else "auto"}
     _convert_batch(scenario, output, options, reply)
 
 
@@ -95,16 +94,31 @@ def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
 def _refuse_together(settings: Mapping[str, Any]) -> None:
     """Settings that can be had alone, but not with each other."""
     try:
-        ConvertSettings(player=settings["player"], version=settings.get("version"))
+        ConvertSettings(player=settings.get("player", Player.STANDARD), version=settings.get("version"))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
-    if settings["player"] is Player.CARLA and settings["mode"] is OutputMode.LANE_OFFSET:
+    if settings.get("player") is Player.CARLA and settings["mode"] is OutputMode.LANE_OFFSET:
         raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--player")
 
 
+def _reports(files: Sequence[str]) -> dict[str, str]:
+    """What is to be written beside an output, by its kind: "page", "summary", "trace"."""
+    from xosc_lateral.files.osi import SUFFIXES
+    from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES
+
+    kinds = {**dict.fromkeys(SUMMARY_SUFFIXES, "summary"), **dict.fromkeys(SUFFIXES, "trace")}
+    found = dict[str, str]()
+    for text in files:
+        kind = kinds.get(PurePath(text).suffix.lower(), "page")
+        if kind in found:
+            raise typer.BadParameter(f"{found[kind]} and {text}: one {kind} of an output", param_hint="--report")
+        found[kind] = text
+    return found
+
+
 def _convert_one(
-    source: Path, places: Sequence[str | None], options: dict[str, Any], limits: JobLimits, variants: int,
-    reply: Written, *, labels: bool,
+    source: Path, output: str | None, reports: Mapping[str, str], options: dict[str, Any], limits: JobLimits,
+    variants: int, reply: Written, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
@@ -118,7 +132,7 @@ def _convert_one(
     def limited(target: Path | None, **more: Any) -> Conversion:
         return for_one(lambda path: convert(path, target, **more, **options), source, limits)
 
-    output, report, osi, summary = places
+    report, osi, summary = (reports.get(kind) for kind in ("page", "trace", "summary"))
     if output == STDOUT:
         if variants > 1 or reply.as_json or osi is not None or summary is not None or labels:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")

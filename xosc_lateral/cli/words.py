@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
+from logging import Formatter, LogRecord
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hints
 
@@ -33,13 +34,27 @@ DOCS_PAGES = {
 """Module of verbs -> pages that say more."""
 
 
+class _LogFormat(Formatter):
+    """Lines of the log: for eyes, or with `--json` as JSON."""
+
+    def __init__(self, context: typer.Context) -> None:
+        super().__init__("%(asctime)s.%(msecs)03d %(message)s", "%H:%M:%S")
+        self._said = context.params
+
+    def format(self, record: LogRecord) -> str:
+        """A line; what the options are is known when it comes."""
+        if self._said.get("as_json"):
+            return in_json({"event": "log", "time": round(record.created, 3), "message": record.getMessage()})
+        return super().format(record)
+
+
 def _begin_log(context: typer.Context, wanted: bool) -> bool:
     """Send the package's log (`logging`, "xosc_lateral") to standard error, until the command ends."""
     if wanted:
         import logging
 
         log, handler = logging.getLogger("xosc_lateral"), logging.StreamHandler()
-        handler.setFormatter(logging.Formatter("%(asctime)s.%(msecs)03d %(message)s", "%H:%M:%S"))
+        handler.setFormatter(_LogFormat(context))
         log.addHandler(handler)
         log.setLevel(logging.INFO)
         context.call_on_close(lambda: log.removeHandler(handler))
@@ -49,7 +64,7 @@ def _begin_log(context: typer.Context, wanted: bool) -> bool:
 # What is said of one option stays together.
 # fmt: off
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", callback=_begin_log,
-    help="Log files and steps, with times, on standard error.")]
+    help="Log files and steps, with times, on standard error; with --json as lines of JSON.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 Osi = Annotated[str | None, typer.Option("--osi", metavar="TRACE",
@@ -134,6 +149,11 @@ class Printing:
     verbose: Verbose = False
     as_json: AsJson = False
 
+    @property
+    def logs_json(self) -> bool:
+        """Whether progress is wanted as lines of JSON."""
+        return self.as_json and self.verbose
+
     def say(self, result: Result, *, even: bool = False, err: bool = False) -> None:
         """JSON on standard output, else text there, or on standard error; `even`: whatever was to be kept quiet."""
         if self.as_json:
@@ -187,7 +207,7 @@ class Written(Printing):
 
 def flags_of(name: str, option: Option) -> tuple[str, ...]:
     """How a setting is called on the command line."""
-    return option.flags or (f"--{name.replace('_', '-')}",)
+    return option.flags or (option.said_by and (option.said_by,)) or (f"--{name.replace('_', '-')}",)
 
 
 def _fields(group: type) -> list[Parameter]:
@@ -204,6 +224,8 @@ def _parameters(source: Any, options: Mapping[str, Option]) -> Iterator[Paramete
         if option.kind is object:  # `columns`
             yield from _fields(Mapped)
             continue
+        if option.said_by:
+            continue
         default = None if type(None) in get_args(option.kind) else defaults[name].default
         words = typer.Option(*flags_of(name, option), **option.words)
         yield Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[option.kind, words])
@@ -215,9 +237,12 @@ def _read(options: Mapping[str, Option], words: dict[str, Any]) -> Options:
     for name, option in options.items():
         if option.kind is object:  # `columns`
             values[name] = Mapped(words.pop("columns"), words.pop("mapping_file")).mapping()
-        elif (stated := words.pop(name)) not in (None, []):
+        elif not option.said_by and (stated := words.pop(name)) not in (None, []):
             with naming_option(flags_of(name, option)[0]):
-                values[name] = option.read(stated)
+                given = {name: stated} if option.gives is None else option.gives(stated)
+                if foreign := sorted(given.keys() - options.keys()):
+                    raise ValueError(f"{given[foreign[0]]}: no {foreign[0]} can be said here")
+                values |= {key: options[key].read(value) for key, value in given.items()}
     return values
 
 
@@ -269,7 +294,7 @@ def with_options(verb: Callable[..., Any]) -> Callable[..., None]:
     @wraps(verb)
     def run(**values: Any) -> None:
         known = {name: option for options in (shared, *sources.values()) for name, option in options.items()}
-        stated = {flags_of(name, option)[0]: values.get(name) for name, option in known.items()}
+        stated = {flags_of(name, one)[0]: values.get(name) for name, one in known.items() if not one.said_by}
         for name, names in groups.items():
             values[name] = declared[name].annotation(**{option: values.pop(option) for option in names})
         for name, options in sources.items():

@@ -50,6 +50,9 @@ class Option:
     prefix: str = ""  # prefix, entry: of columns that hold one entry each of a mapping
     entry: Cell | None = None
     decides: bool = True  # on an output's bytes
+    # gives: what the command line's words say, where they may stand for several keywords; or `ValueError`
+    gives: Callable[[Any], Mapping[str, Any]] | None = None
+    said_by: str = ""  # the command line's option that gives it, too; it has none of its own
 
     def value(self, name: str, stated: Any) -> Any:
         """The field's value; `ValueError` with the option's name before it."""
@@ -80,18 +83,27 @@ def option(
     prefix: str = "",
     entry: Cell | None = None,
     decides: bool = True,
+    gives: Callable[[Any], Mapping[str, Any]] | None = None,
+    said_by: str = "",
     **words: Any,
 ) -> Any:
     """Declare a field that users can set; see `Option`."""
-    metadata = {"option": Option(read, flags, kind, words, cell, prefix, entry, decides)}
+    metadata = {"option": Option(read, flags, kind, words, cell, prefix, entry, decides, gives, said_by)}
     if isinstance(default, dict):
         return field(default_factory=dict, metadata=metadata)
     return field(default=default, metadata=metadata)
 
 
-def flag(*flags: str, kind: Any = None, read: Callable[[Any], Any] = lambda stated: stated, **words: Any) -> Option:
+def flag(
+    *flags: str,
+    kind: Any = None,
+    read: Callable[[Any], Any] = lambda stated: stated,
+    gives: Callable[[Any], Mapping[str, Any]] | None = None,
+    said_by: str = "",
+    **words: Any,
+) -> Option:
     """What the command line says of a call's keyword, in its annotation: ``Annotated[float, flag(help=...)]``."""
-    return Option(read, flags, kind, words)
+    return Option(read, flags, kind, words, gives=gives, said_by=said_by)
 
 
 def declare_options(call: Verb) -> Verb:
@@ -150,7 +162,10 @@ def options_of(source: Callable[..., Any]) -> dict[str, Option]:
     options = {item.name: item.metadata["option"] for item in settable(source)}
     for name, option in options.items():
         if option.kind is None and (shared := SHARED.get(name)) is not None:
-            options[name] = replace(option, flags=shared.flags, kind=shared.kind, words=shared.words)
+            options[name] = replace(
+                option, flags=shared.flags, kind=shared.kind, words=shared.words, gives=shared.gives,
+                said_by=shared.said_by,
+            )  # fmt: skip
     return options
 
 
@@ -309,6 +324,27 @@ def json_object(text: str, _folder: Path) -> dict[str, str]:
     return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}
 
 
+def roads(stated: Sequence[Path]) -> dict[str, Any]:
+    """A road's file, and folders with roads known by name."""
+    folders, files = ([path for path in stated if path.is_dir() is is_folder] for is_folder in (True, False))
+    if len(files) > 1:
+        raise ValueError(f"{files[0]} and {files[1]}: a scenario has one road")
+    return {**({"road": files[0]} if files else {}), **({"road_path": folders} if folders else {})}
+
+
+def profiles_named(common: str, by_name: str) -> Callable[[Sequence[str]], dict[str, Any]]:
+    """What ``PROFILE`` and ``NAME=PROFILE`` give to the keywords for everybody and for some."""
+
+    def gives(stated: Sequence[str]) -> dict[str, Any]:
+        named = [word for word in stated if "=" in word and not Path(word).exists()]
+        plain = [word for word in stated if word not in named]
+        if len(plain) > 1:
+            raise ValueError(f"{plain[0]} and {plain[1]}: one profile for everybody, others as NAME=PROFILE")
+        return {**({common: plain[0]} if plain else {}), **({by_name: named} if named else {})}
+
+    return gives
+
+
 class Part(StrEnum):
     """Parts of a profile that are left out unless asked for."""
 
@@ -329,9 +365,9 @@ SHARED: Mapping[str, Option] = {
         help="Set a scenario parameter; may be repeated."),
     "allow": flag(kind=list[Path] | None,
         help="Folder that roads and catalogs may be read from; may be repeated."),
-    "road": flag("--road", kind=Path | None, show_default=False, help="OpenDRIVE file, whatever the scenario says."),
-    "road_path": flag("--road-path", kind=list[Path] | None, metavar="DIR",
-        help='Folder with roads known by name ("Town04"); may be repeated.'),
+    "road": flag("--road", kind=list[Path] | None, metavar="FILE|FOLDER", show_default=False, gives=roads,
+        help='OpenDRIVE file, whatever the scenario says; folder of roads known by name ("Town04"), may be repeated.'),
+    "road_path": flag(said_by="--road", help='Folders with roads known by name ("Town04").'),
     "time_limit": flag(kind=float | None, read=seconds, min=0.1, max=86_400, show_default=False,
         help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one."),
     "jobs": flag(kind=int, read=process_count, help="Number of processes; -1: one per core."),

@@ -45,7 +45,7 @@ MADE = """
 import sys
 from xosc_lateral.cli import main
 
-words = ["template write cut-in -o .", "convert cut-in.xosc -o o.xosc --osi t.mcap --time-limit 12 --seed 3",
+words = ["template write cut-in -o .", "convert cut-in.xosc -o o.xosc --report t.mcap --time-limit 12 --seed 3",
          "export c -o c -p motorway", "export fmu -o d.fmu -p rural", "export c -o two -p two.json",
          "sample -o s.csv --duration 60 -p motorway", "sample -o two.csv --duration 60 -p two.json"]
 sys.exit(any(main(line.split()) for line in words))

@@ -146,7 +146,17 @@ def test_play_and_convert_write_traces(tmp_path: Path, capsys) -> None:
     assert main(["states", scenario, "--osi", str(tmp_path / "trace.txt")]) == 1
     assert "expected a name ending in .mcap or .osi" in capsys.readouterr().err
     out = tmp_path / "out.xosc"
-    made = ["convert", scenario, "-o", str(out), "--osi", str(tmp_path / "both.mcap"), "--quiet", "--time-limit", "20"]
+    made = [
+        "convert",
+        scenario,
+        "-o",
+        str(out),
+        "--report",
+        str(tmp_path / "both.mcap"),
+        "--quiet",
+        "--time-limit",
+        "20",
+    ]
     assert main([*made, "--ego", "none"]) == 0
     enriched, nominal = messages(tmp_path / "both.mcap"), messages(tmp_path / "both_nominal.mcap")
     assert len(enriched) == len(nominal)

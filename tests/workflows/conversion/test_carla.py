@@ -135,7 +135,7 @@ def test_a_conversion_is_left_handed_too_and_keeps_the_town(tmp_path: Path, maps
 
 def test_a_town_that_is_not_there_costs_one_line(tmp_path: Path, maps: RoadSearch) -> None:
     scenario = _scenario(tmp_path, WORLD.format(y=18.0, h=0.3))
-    with pytest.raises(FormatError, match="--road-path"):
+    with pytest.raises(FormatError, match="name its folder or the file by --road"):
         play_scenario(scenario)
     named = RoadSearch(file=maps.folders[0] / "Town77.xodr")
     assert play_scenario(scenario, roads=named).scenario.road_file == named.file

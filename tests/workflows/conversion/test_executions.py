@@ -32,7 +32,7 @@ def test_offsets_follow_so_many_runs_of_an_action(endless: Path, monkeypatch: py
 
 def test_a_single_conversion_ends_within_its_limit(endless: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = endless.with_name("out.xosc")
-    assert main(["convert", str(endless), "-o", str(output), "--job-timeout", "1"]) == 1
-    line = f"xosc-lateral: {endless}: took longer than 1 s; --job-timeout raises the limit"
+    assert main(["convert", str(endless), "-o", str(output), "--job-limit", "1s"]) == 1
+    line = f"xosc-lateral: {endless}: took longer than 1 s; --job-limit raises the limit"
     assert capsys.readouterr().err.strip() == line
     assert {path.suffix for path in endless.parent.iterdir()} == {".xosc", ".xodr"} and not output.exists()

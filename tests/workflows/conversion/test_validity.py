@@ -32,7 +32,7 @@ def test_a_lone_lane_that_is_none_of_a_road_moves_nobody_unless_named(
     if width < 6.0 or not alone:
         assert "Truck" in moved
     else:
-        assert not moved and "a proving ground's: keeps its line (--entity" in str(made)
+        assert not moved and "a proving ground's: keeps its line (--profile" in str(made)
         named = xl.convert(path, tmp_path / "named.xosc", seed=1, ego="none", time_limit=8.0,
                            entity={"Truck": "motorway"})  # fmt: skip
         assert [one["name"] for one in named.to_dict()["entities"] if one["profile"]] == ["Truck"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, ScenarioInput, scenario_input, several
 from xosc_lateral.workflows.opened import HeldPath, is_document, opened, opened_as_one
-from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike, declare_options, flag
+from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike, declare_options, flag, roads
 from xosc_lateral.workflows.options import paths as as_paths
 from xosc_lateral.workflows.result import given_profile
 
@@ -77,8 +77,9 @@ def detect(
     sight: Annotated[bool, flag(
         help="Range of vision instead: how often a vehicle sees the car before the car ahead.")] = False,
     seed: int = 0,
-    road: Annotated[RoadLike | None, flag("--road", kind=Path | None, show_default=False,
-        help="OpenDRIVE file of a recording without one.")] = None,
+    road: Annotated[RoadLike | None, flag("--road", kind=list[Path] | None, metavar="FILE|FOLDER",
+        show_default=False, gives=roads,
+        help="OpenDRIVE file of a recording without one; folder with roads known by name, may be repeated.")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     allow: Paths = (),

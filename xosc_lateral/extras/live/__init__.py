@@ -26,4 +26,4 @@ CALLS = {
     "LiveRun": "xosc_lateral.extras.live.call",
 }
 SERVICES = {"told_by_player": "xosc_lateral.extras.live.user_player"}
-"""What `convert --player-library` has this extra do."""
+"""What `convert --player LIBRARY` has this extra do."""

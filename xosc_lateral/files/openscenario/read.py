@@ -206,9 +206,7 @@ def _road_file(logic: XmlElement, written: str, boundary: Boundary, notes: list[
         missing = error
     if is_town(written):
         name += ".xodr"
-        missing = place.error(
-            f"road '{written}' is not beside the scenario; name its folder by --road-path or the file by --road"
-        )
+        missing = place.error(f"road '{written}' is not beside the scenario; name its folder or the file by --road")
     folder = boundary.folder
     beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
     for near in (*beside, *roads.folders):

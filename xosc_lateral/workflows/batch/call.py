@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -40,22 +41,48 @@ BATCH = "Batches"
 """Heading of their options on the command line."""
 
 
+def _workers(stated: str) -> dict[str, Any]:
+    """So many processes, or those of a cluster."""
+    if ":" in stated:
+        return {"cluster": stated}
+    try:
+        return {"workers": int(stated)}
+    except ValueError as error:
+        raise ValueError(f"{stated!r} is neither a number nor the address of a dask scheduler") from error
+
+
+LIMITS = {"s": ("job_timeout", 1.0, 86_400.0), "MB": ("job_memory", 100.0, 1e6)}
+"""Unit of a limit of one scenario -> keyword, and between what it can be."""
+
+
+def _limits(stated: Sequence[str]) -> dict[str, Any]:
+    """Limits of one scenario by their units."""
+    found = dict[str, Any]()
+    for text in stated:
+        match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(s|MB)", text)
+        name, least, most = LIMITS[match[2]] if match else ("", 0.0, 0.0)
+        if match is None or not least <= float(match[1]) <= most:
+            raise ValueError(f"{text!r}, expected 1s to 86400s or 100MB to 1000000MB")
+        found[name] = float(match[1])
+    return found
+
+
 @spelled_out(ConvertSettings)
 @declare_options
 def convert_many(
     scenarios: ScenariosLike,
     output: PathLike, *,
     variants: Annotated[int, flag(help="Number of outputs, each with different offsets.", min=1)] = 1,
-    report: Annotated[PathLike | None, flag(kind=str | None, metavar="PAGE.html",
-        help="Page that shows what was added; for a batch, a folder of pages.")] = None,
-    workers: Annotated[int, flag("--jobs", read=process_count, help="Number of processes; -1: one per core.",
+    report: PathLike | None = None,
+    workers: Annotated[int, flag("--jobs", kind=str | None, metavar="N|ADDRESS", show_default=False, read=process_count,
+        gives=_workers, help="Number of processes (default 1); -1: one per core. Address of a dask scheduler: there.",
         rich_help_panel=BATCH)] = 1,
-    job_timeout: Annotated[float, flag(help="Time limit per scenario [s].", min=1, max=86_400,
-        rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
-    job_memory: Annotated[float, flag(help="Memory limit per scenario [MB].", min=100, max=1e6,
-        rich_help_panel=BATCH)] = JOB_MEMORY.value,
-    cluster: Annotated[str | None, flag(metavar="ADDRESS", help="Address of a dask scheduler.",
-        rich_help_panel=BATCH)] = None,
+    job_timeout: Annotated[float, flag("--job-limit", kind=list[str] | None, metavar="600s|4000MB", show_default=False,
+        gives=_limits, help=f"Of each scenario: time ({JOB_TIMEOUT.value:g}s), memory ({JOB_MEMORY.value:g}MB); may be "
+        "repeated.", rich_help_panel=BATCH)] = JOB_TIMEOUT.value,
+    job_memory: Annotated[float, flag(kind=float, said_by="--job-limit", help="Memory.")] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, flag(kind=str, said_by="--jobs",
+        help="Address of a dask scheduler, whose workers work.")] = None,
     shard: Annotated[str | None, flag("--shard", metavar="K/N",
         help="Part K of N, for a scheduler: all parts together leave what one run leaves.",
         rich_help_panel=BATCH)] = None,

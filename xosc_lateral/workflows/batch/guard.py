@@ -31,12 +31,12 @@ class JobLimits:
     @property
     def too_much(self) -> str:
         """Why a job was ended that took more memory."""
-        return f"took more than {self.memory:g} MB of memory" + "; --job-memory raises the limit" * (not self.fixed)
+        return f"took more than {self.memory:g} MB of memory" + "; --job-limit raises the limit" * (not self.fixed)
 
     @property
     def too_long(self) -> str:
         """Why a job was ended that took more time."""
-        return f"took longer than {self.timeout:g} s" + "; --job-timeout raises the limit" * (not self.fixed)
+        return f"took longer than {self.timeout:g} s" + "; --job-limit raises the limit" * (not self.fixed)
 
 
 def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:

@@ -127,13 +127,17 @@ class _Origin:
         return cls(facts, scenario, replace(settings, **places), variant)
 
 
+ROADS = flag("--road", kind=list[Path] | None, metavar="FOLDER",
+    help='Folder with roads known by name ("Town04"); may be repeated.')  # fmt: skip
+
+
 @declare_options
 def verify(
     outputs: Paths,
     *,
     library: Paths = (),
     allow: Paths = (),
-    road_path: Paths = (),
+    road_path: Annotated[Paths, ROADS] = (),
     fast: Annotated[bool, flag("--fast", help="Compare hashes alone; make nothing again.")] = False,
     workers: int = 0,
 ) -> Verification:
@@ -289,7 +293,7 @@ def reproduce(
     *,
     library: Paths = (),
     allow: Paths = (),
-    road_path: Paths = (),
+    road_path: Annotated[Paths, ROADS] = (),
     workers: Annotated[
         int, flag("--jobs", read=process_count, help="Of a folder: number of processes; -1: one per core.")
     ] = 1,

@@ -183,7 +183,7 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
     egos = vehicles_under_test(scenario)
     if named:  # who names them means these: a name of the file says nothing then, a mark does
         egos = {name: why for name, why in egos.items() if why != BY_NAME} | named
-    for option, wanted in (("--entity", settings.entity), ("--enrich", settings.only or ())):
+    for option, wanted in (("--profile", settings.entity), ("--enrich", settings.only or ())):
         for name in wanted:
             if name in egos:
                 raise FormatError(
@@ -277,7 +277,7 @@ NO_DRIVER = {
     VehicleCategory.TRAILER: "a trailer has no driver",
     VehicleCategory.TRAIN: "a train is bound to its track",
     VehicleCategory.TRAM: "a tram is bound to its track",
-    VehicleCategory.BICYCLE: "there is no profile for bicycles; name one with --entity",
+    VehicleCategory.BICYCLE: "there is no profile for bicycles; name one with --profile NAME=PROFILE",
 }
 """Vehicles that "auto" leaves alone, and why."""
 
@@ -297,7 +297,7 @@ def choose_drivers(
     Raises `FormatError`: the settings name an entity that there is not; `DriverProfileError`: a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
-    asked = (("--entity", settings.entity), ("--enrich", settings.only or ()), ("--ego", settings.ego or ()))
+    asked = (("--profile", settings.entity), ("--enrich", settings.only or ()), ("--ego", settings.ego or ()))
     for option, names in () if settings.names_may_lack else asked:
         for name in sorted(names):
             if name not in known:
@@ -345,6 +345,6 @@ def _without_proving_grounds(
             width = float(np.median(network.lane_width(road, lane, s))) if len(rows) else 0.0
             if width > PROVING_GROUND_WIDTH and float(np.median(network.lane_index(road, lane, s)[1])) <= 1.0:
                 moved[entity.name] = (
-                    f"lane of {width:.1f} m, a proving ground's: keeps its line (--entity NAME=PROFILE moves it)"
+                    f"lane of {width:.1f} m, a proving ground's: keeps its line (--profile NAME=PROFILE moves it)"
                 )
     return moved

@@ -44,6 +44,25 @@ class OutputMode(StrEnum):
     LANE_OFFSET = "lane-offset"
 
 
+class Addition(StrEnum):
+    """What is left out unless asked for."""
+
+    SENSOR = "sensor"
+    JAM_CORRIDOR = "jam-corridor"
+
+
+_KEYWORDS = {Addition.SENSOR: "with_sensor", Addition.JAM_CORRIDOR: "jam_corridor"}
+
+
+def _player(stated: str) -> dict[str, Any]:
+    """Who plays an output: a name, or the library of esmini."""
+    if stated in [*Player]:
+        return {"player": stated}
+    if not Path(stated).exists():
+        raise ValueError(f"{stated!r}, expected one of {', '.join(Player)}, or the path of the library of esmini 3")
+    return {"player": Player.ESMINI, "player_library": stated}
+
+
 @say.documented
 @dataclass(frozen=True, slots=True)
 class ConvertSettings:
@@ -93,13 +112,14 @@ class ConvertSettings:
     # What is said of one option stays together.
     # fmt: off
     profile: str | DriverProfile = option(
-        AUTO, say.profile, "--profile", "-p", kind=str, cell=say.profile_cell,
-        help="Name or path of a driver profile; auto: motorway, the population.",
+        AUTO, say.profile, "--profile", "-p", kind=list[str] | None, cell=say.profile_cell,
+        metavar="PROFILE|NAME=PROFILE", gives=say.profiles_named("profile", "entity"), show_default=False,
+        help="Name or path of a driver profile; auto: motorway, the population (default). For one entity NAME=PROFILE; "
+        "may be repeated.",
     )
     seed: int = option(0, say.whole_number(0), cell=say.as_it_is)
     entity: Mapping[str, str | DriverProfile] = option(
-        {}, say.profiles, kind=list[str] | None, metavar="NAME=PROFILE", prefix="profile:", entry=say.profile_cell,
-        help="Profile of one entity; may be repeated.",
+        {}, say.profiles, said_by="--profile", prefix="profile:", entry=say.profile_cell, help="Profiles by entity.",
     )
     only: frozenset[str] | None = option(
         None, say.names, "--enrich", kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
@@ -133,12 +153,13 @@ class ConvertSettings:
         "a vehicle under test.",
     )
     player: Player = option(
-        Player.STANDARD, say.one_of(Player), "--player", kind=Player, cell=say.as_it_is,
-        help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
+        Player.STANDARD, say.one_of(Player), "--player", kind=str | None, cell=say.as_it_is, show_default=False,
+        metavar="standard|esmini|carla|LIBRARY", gives=_player,
+        help="Who plays it: standard (default), or made for esmini or CARLA's ScenarioRunner. libesminiLib.so or "
+        "esminiLib.dll of esmini 3: made for esmini, and a reactive output is checked in it, too.",
     )
     player_library: Path | None = option(
-        None, Path, "--player-library", kind=Path | None, decides=False, show_default=False,
-        help="libesminiLib.so or esminiLib.dll of esmini 3: the check of a reactive output runs in it, too.",
+        None, Path, decides=False, said_by="--player",
     )
     version: str | None = option(
         None, str, kind=str | None, metavar="1.0..1.4", cell=say.as_it_is, show_default=False,
@@ -152,11 +173,13 @@ class ConvertSettings:
         help="Attempts at most, while vehicles collide or leave their lane.",
     )
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
-    with_sensor: bool = option(False, bool)
-    jam_corridor: bool = option(
-        False, bool, "--jam-corridor", kind=bool,
-        help="Below 40 km/h on motorways the leftmost lane keeps left, others right. Assumed: nobody measured how far.",
+    with_sensor: bool = option(
+        False, bool, "--with", kind=list[Addition] | None, show_default=False,
+        gives=lambda stated: {f"{_KEYWORDS[one]}": True for one in stated},
+        help="sensor: the error of the sensor that measured the drives, too; jam-corridor: below 40 km/h on motorways "
+        "the leftmost lane keeps left, others right (assumed: nobody measured how far); may be repeated.",
     )
+    jam_corridor: bool = option(False, bool, said_by="--with")
     strict: bool = option(
         False, bool, "--strict", kind=bool, decides=False,
         help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched.",
