@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -35,8 +37,11 @@ from tests.kit.scenario_files import (
     time_condition,
 )
 from xosc_lateral.base.plugins import shipped_folder
+from xosc_lateral.extras.live.esmini import EsminiTraffic
+from xosc_lateral.extras.live.esmini_library import open_player
 from xosc_lateral.extras.live.moment import Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
+from xosc_lateral.workflows.options import NO_EGO
 
 LANE = '<lane id="-{k}" type="driving">{link}<width sOffset="0" a="3.6" b="0" c="0" d="0"/></lane>'
 LINKED = '<link><predecessor id="-{k}"/><successor id="-{k}"/></link>'
@@ -58,8 +63,7 @@ def _long_road(folder: Path) -> None:
     (folder / "road.xodr").write_text(ROAD.format(length=60_000.0, lanes=lanes), encoding="utf-8")
 
 
-def vehicles(n: int, folder: Path) -> float:
-    """A scenario of 10 s, cars 50 m one behind the other on three lanes."""
+def _crowd(n: int, folder: Path) -> str:
     _long_road(folder)
     names = [f"v{k}" for k in range(n)]
     init = "".join(
@@ -67,7 +71,29 @@ def vehicles(n: int, folder: Path) -> float:
         for k, name in enumerate(names)
     )
     entities = "".join(map(entity, names))
-    return _convert(folder, scenario_text(entities=entities, init=init, stories=story(actors=("v0",)), minor=2))
+    return scenario_text(entities=entities, init=init, stories=story(actors=("v0",)), minor=2)
+
+
+def vehicles(n: int, folder: Path) -> float:
+    """A scenario of 10 s, cars 50 m one behind the other on three lanes."""
+    return _convert(folder, _crowd(n, folder))
+
+
+def in_esmini(n: int, folder: Path) -> float:
+    """The same, its drivers for 900 steps of 10 ms in esmini (`ESMINI_LIBRARY`); the slowest step on standard error."""
+    (folder / "a.xosc").write_text(_crowd(n, folder), encoding="utf-8")
+    player = open_player(os.environ["ESMINI_LIBRARY"], folder / "a.xosc")
+    traffic = EsminiTraffic(player, folder / "a.xosc", xl.read_profile("motorway"), ego=NO_EGO, seed=1)
+    steps = []
+    for _ in range(950):
+        steps.append(_timed(lambda: traffic.steer(0.01)))
+        player.SE_StepDT(0.01)
+        steps[-1] += _timed(lambda: traffic.settle(0.01))
+    print(
+        f"{n} in esmini: {1e3 * np.mean(steps[50:]):.2f} ms a step, at most {1e3 * max(steps[50:]):.1f}",
+        file=sys.stderr,
+    )
+    return sum(steps[50:])
 
 
 def arrivals(n: int, folder: Path) -> float:
@@ -133,7 +159,8 @@ def library(n: int, folder: Path) -> float:
 
 
 SIZES: dict[Callable[[int, Path], float], tuple[int, ...]] = {
-    vehicles: (1, 10, 100, 1000), arrivals: (10, 100, 1000, 10_000), many_roads: (1, 50, 500, 5000),
+    vehicles: (1, 10, 100, 1000), in_esmini: (10, 50, 200), arrivals: (10, 100, 1000, 10_000),
+    many_roads: (1, 50, 500, 5000),
     events: (1, 50, 500, 5000), hours: (1, 10, 100), columns: (5, 50, 500), library: (10, 100, 1000),
 }  # fmt: skip
 
@@ -145,7 +172,7 @@ def main() -> None:
     given = parser.parse_args()
     print("| what | size: processor time | exponent |\n|---|---|---|")
     for measure, sizes in SIZES.items():
-        if given.what and measure.__name__ not in given.what:
+        if measure.__name__ not in (given.what or ({each.__name__ for each in SIZES} - {"in_esmini"})):
             continue
         found: list[tuple[int, float]] = []
         for n in (sizes[0], *(n for n in sizes if n <= given.most)):

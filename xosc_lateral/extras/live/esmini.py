@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.esmini_library import ObjectState, Player, StoryboardCallback
-from xosc_lateral.extras.live.esmini_places import Ledger, Place, Rest, ToldPlace
+from xosc_lateral.extras.live.esmini_library import STATE, ObjectState, Player, StoryboardCallback
+from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest
 from xosc_lateral.extras.live.loop import Row
 from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
 from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, left_of_gap
@@ -121,11 +123,14 @@ class EsminiTraffic:
         for element in self.player.heard:  # what began within SE_Init
             self._follow_action(*element)
         self._touched.clear()  # what is over by now has put everybody where he begins
-        names = {name for name, _ in self._objects()}
+        names = {*self.player.objects()[0]}
         if missing := sorted((self.ego.named | set(profiles or {})) - names):
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
-        self.moves: dict[str, tuple[float, bool]] = {}
+        self._moved: tuple[tuple[str, ...], Moves | None] = ((), None)
+        self._why: dict[tuple[str, int, int], str] = {}
+        self._named: tuple[str, ...] = ()
+        self._units = np.zeros(0, dtype=np.int64)
         pulled_by = {entity.trailer: entity.name for entity in model.entities if entity.trailer is not None}
         self._unit = {entity.name: _first_of(entity.name, pulled_by) for entity in model.entities}
 
@@ -135,31 +140,35 @@ class EsminiTraffic:
         Raises `SimulationError` if what the simulation says can't be used; nothing was reported then, and the
         simulation can go on.
         """
-        there = dict(self._objects())
-        vehicles = self._ledger.vehicles
-        for gone in vehicles.keys() - there.keys():  # who is added again begins anew
-            del vehicles[gone]
-        seen = {name: state for name, state in there.items() if self._is_sound(name, state)}
-        moment, places = self._moment(seen, dt)
+        names, every = self.player.objects()
+        self._ledger.keep(names)
+        rows = self._sound(names, every)
+        states = every[rows]
+        moment, places = self._moment(rows, states, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
-        starts: dict[str, float] = {}
-        for row, (name, state) in enumerate(seen.items()):
-            known, place = vehicles[name], places[row]
-            known.steered, known.rate = bool(moves.steered[row]), float(moves.rate[row])
-            if known.steered:
-                offset = float(moves.offset[row])
-                t = place.centre + place.left * offset
-                self._tell(name, state, t)
-                if known.place is None:
-                    starts[name] = t - state.t
-                known.place = offset
-                self.undriven.pop(name, None)
-        for name, state in seen.items():  # where a vehicle begins, what it pulls begins behind it
+        known = self._ledger.known
+        known["steered"][rows], known["rate"][rows] = moves.steered, moves.rate
+        own = np.flatnonzero(moves.steered)
+        t = places.centre[own] + places.left[own] * moves.offset[own]
+        begin = np.flatnonzero(np.isnan(known["place"][rows[own]])).tolist()
+        starts = {moment.names[own[k]]: t[k] - states["t"][own[k]] for k in begin}
+        self._tell(rows[own], states[own], t)
+        known["place"][rows[own]] = moves.offset[own]
+        for name in [name for name in self.undriven if name in moment.names]:
+            if moves.steered[moment.names.index(name)]:
+                del self.undriven[name]
+        for k, name in enumerate(moment.names if starts else ()):  # what it pulls begins behind a vehicle
             first = self._unit.get(name, name)
             if first != name and first in starts:
-                self._tell(name, state, state.t + starts[first])
-        self.moves = moves.by_name(moment.names)
+                self._tell(rows[k : k + 1], states[k : k + 1], states["t"][k : k + 1] + starts[first])
+        self._moved = moment.names, moves
         return moves
+
+    @property
+    def moves(self) -> dict[str, tuple[float, bool]]:
+        """Offset of each vehicle [m], and whether it is its driver's, as `steer` had them."""
+        names, moves = self._moved
+        return {} if moves is None else moves.by_name(names)
 
     def settle(self, dt: float) -> None:
         """Let what a maneuver has cut off at its start run out, offset and lateral speed; after ``SE_StepDT(dt)``.
@@ -168,27 +177,34 @@ class EsminiTraffic:
         where their vehicle is. What is reported after a step is seen in the vehicle's state until the next one, and
         changes nothing of the action.
         """
-        busy = self._busy()
-        for name, state in self._objects():
-            if (known := self._ledger.vehicles.get(name)) is None:
+        busy, ledger = self._busy(), self._ledger
+        if not busy and not ledger.rests:
+            return
+        names, every = self.player.objects()
+        ledger.keep(names)
+        for row, name in enumerate(names):
+            if name not in busy and name not in ledger.rests:
                 continue
-            pace = float(clock_rate(np.array([state.speed]))[0])
-            if name in busy and known.steered:  # begun in this step, in which the driver's place still counts
-                if (gap := self._ledger.dropped(known, state)) is None:
+            known, state = ledger.known[row], every[row : row + 1]
+            speed = state["speed"]
+            pace = float(clock_rate(speed)[0])
+            if name in busy and known["steered"]:  # begun in this step, in which the driver's place still counts
+                if (gap := ledger.dropped(row, state)) is None:
                     continue
-                rate = known.rate / max(pace, CLOCK_TOLERANCE)
-                known.rest = Rest(gap, rate, float(leading_time(*np.array([gap, rate, state.speed]))), -dt * pace)
-            elif self._ledger.road_of(state) < 0 or (name not in busy and name not in self._touched):
-                known.rest = None
+                rate = float(known["rate"]) / max(pace, CLOCK_TOLERANCE)
+                over = leading_time(*np.array([[gap], [rate], [speed[0]]]))
+                ledger.rests[name] = Rest(gap, rate, float(over[0]), -dt * pace)
+            elif ledger.roads_of(state)[0] < 0 or (name not in busy and name not in self._touched):
+                ledger.rests.pop(name, None)
             # once more when the action is over: from there on the driver leads over
-            if (rest := known.rest) is not None and (rest.gap or abs(state.speed) > AT_REST):
+            if (rest := ledger.rests.get(name)) is not None and (rest.gap or abs(speed[0]) > AT_REST):
                 rest.passed += dt * pace
                 left = left_of_gap(*np.array([[rest.passed / rest.over], [rest.over], [rest.gap], [rest.rate]]))
-                room = self._ledger.room_to_middle(state)
+                room = float(ledger.room_to_middle(state)[0])
                 rest.way = float(left[0] * smooth_step(np.array([min(max(room / MIDDLE, 0.0), 1.0)]))[0])
                 if room > 0.0 and rest.way:
-                    t = state.t + self._ledger.left_of(state) * rest.way
-                    self.player.SE_ReportObjectLateralPosition(state.id, t)
+                    t = float(state["t"][0] + ledger.left_of(state)[0] * rest.way)
+                    self.player.SE_ReportObjectLateralPosition(int(state["id"][0]), t)
 
     # ---- a simulation that runs by itself (`loop`) -------------------------------------------------------------------
     def time(self) -> float:
@@ -201,11 +217,13 @@ class EsminiTraffic:
 
     def rows(self) -> Iterator[Row]:
         """Where everybody is now."""
-        now = self.time()
-        for name, state in self._objects():
-            place = (state.road, state.lane, state.s, self.offset_of(state))
-            move = self.moves.get(name, (float("nan"), False))
-            yield now, name, state.x, state.y, state.h, state.speed, *place, *move, state.z, state.p, state.r
+        now, (names, states), moves = self.time(), self.player.objects(), self.moves
+        columns = [states[what].tolist() for what in ("x", "y", "h", "speed", "road", "lane", "s")]
+        offsets = (states["offset_t"] * self._ledger.left_of(states)).tolist()
+        for k, name in enumerate(names):
+            move, state = moves.get(name, (float("nan"), False)), states[k]
+            at = (column[k] for column in columns)
+            yield now, name, *at, offsets[k], *move, float(state["z"]), float(state["p"]), float(state["r"])
 
     def drive(self, step: float) -> None:
         """On by a step [s]; raises `SimulationError` if the player can't."""
@@ -216,22 +234,23 @@ class EsminiTraffic:
 
     def states(self) -> dict[str, ObjectState]:
         """Of all objects, by name."""
-        return dict(self._objects())
+        names, states = self.player.objects()
+        return {name: ObjectState.from_buffer_copy(state.tobytes()) for name, state in zip(names, states, strict=True)}
 
     def offset_of(self, state: ObjectState) -> float:
         """From the centre of the lane that it is on, positive LEFT of travel. [m]"""
-        return float(state.offset_t) * self._ledger.left_of(state)
+        return float(state.offset_t * self._ledger.left_of(np.frombuffer(bytes(state), dtype=STATE))[0])
 
     # ---- what is told ------------------------------------------------------------------------------------------------
-    def _tell(self, name: str, state: ObjectState, t: float) -> None:
-        """Report a place [m], and the speed that there is; who stands is where he is."""
-        if abs(state.speed) > AT_REST:
-            self.player.SE_ReportObjectSpeed(state.id, state.speed)
-            self.player.SE_ReportObjectLateralPosition(state.id, t)
-        else:
-            t = state.t
-        offset_t = state.offset_t + t - state.t
-        self._ledger.vehicles[name].told_place = ToldPlace(self._ledger.road_of(state), state.lane, t, offset_t)
+    def _tell(self, rows: IntArray, states: NDArray[Any], t: FloatArray) -> None:
+        """Report places of vehicles [m], and the speeds that there are; who stands is where he is."""
+        is_moving = np.abs(states["speed"]) > AT_REST
+        speak, place = self.player.SE_ReportObjectSpeed, self.player.SE_ReportObjectLateralPosition
+        on = (column[is_moving].tolist() for column in (states["id"], states["speed"], t))
+        for number, speed, at in zip(*on, strict=True):
+            speak(number, speed)
+            place(number, at)
+        self._ledger.tell(rows, states, np.where(is_moving, t, states["t"]))
 
     def _say(self, key: tuple[str, str], line: str) -> None:
         """A warning, once for its key."""
@@ -244,73 +263,62 @@ class EsminiTraffic:
         """Whom a lateral action moves now."""
         return {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
 
-    def _objects(self) -> Iterator[tuple[str, ObjectState]]:
-        for index in range(self.player.SE_GetNumberOfObjects()):
-            number = self.player.SE_GetId(index)
-            state = self.player.state(number)
-            if state is not None:
-                yield (self.player.SE_GetObjectName(number) or b"").decode(), state
+    def _sound(self, names: tuple[str, ...], states: NDArray[Any]) -> IntArray:
+        """Rows of vehicles that say where they are; one that doesn't is left alone, which is a warning."""
+        is_vehicle = states["type"] == _VEHICLE_TYPE
+        for k in np.flatnonzero(~is_vehicle).tolist():
+            self.undriven.setdefault(names[k], "no vehicle")
+        is_sound = is_vehicle.copy()
+        for what in ("x", "y", "h", "t", "s", "speed", "offset_t"):
+            finite = np.isfinite(states[what])
+            for k in np.flatnonzero(is_sound & ~finite).tolist():
+                line = f"vehicle {names[k]!r}: {what} is {states[what][k]}; it is left alone"
+                self._say((names[k], what), line)
+            is_sound &= finite
+        return np.flatnonzero(is_sound)
 
-    def _is_sound(self, name: str, state: ObjectState) -> bool:
-        """Whether it is a vehicle that says where it is; one that doesn't is left alone, which is a warning."""
-        if state.type != _VEHICLE_TYPE:
-            self.undriven.setdefault(name, "no vehicle")
-            return False
-        numbers = {what: getattr(state, what) for what in ("x", "y", "h", "t", "s", "speed", "offset_t")}
-        bad = [what for what, value in numbers.items() if not np.isfinite(value)]
-        if bad:
-            self._say((name, bad[0]), f"vehicle {name!r}: {bad[0]} is {numbers[bad[0]]}; it is left alone")
-        return not bad
-
-    def _why_not_ours(self, name: str, state: ObjectState) -> str:
+    def _why_not_ours(self, name: str, controller: int, category: int) -> str:
         """Why no driver of ours has a vehicle; empty: he may."""
         if name in self.ego.named:
             return "it is under test"
-        if state.category in _PULLED_CATEGORIES:
+        if category in _PULLED_CATEGORIES:
             return "it is pulled"
-        if state.ctrl_type in EXTERNAL_CONTROLLERS:
+        if controller in EXTERNAL_CONTROLLERS:
             self.waits.add(name)
             return "its controller waits for another program"
         if name in self.ego:
             return f"it is under test{self.ego.why(name)}"
-        return "a controller of its own steers it" if state.ctrl_type != 0 or name in self._steered else ""
+        return "a controller of its own steers it" if controller != 0 or name in self._steered else ""
 
-    def _moment(self, seen: dict[str, ObjectState], dt: float) -> tuple[Moment, list[Place]]:
-        names, now, busy = tuple(seen), float(self.player.SE_GetSimulationTime()), self._busy()
-        column = {
-            what: np.array([getattr(state, what) for state in seen.values()], dtype=np.float64)
-            for what in ("x", "y", "s", "speed", "length", "width", "center_x")
-        }
-        why = {name: self._why_not_ours(name, state) for name, state in seen.items()}
-        anew = self.traffic.is_due(now + dt)
-        places = [
-            self._ledger.place(
-                name, state, now, in_action=name in busy or name in self._touched, is_ours=not why[name], anew=anew
-            )
-            for name, state in seen.items()
-        ]
-        for name, place in zip(names, places, strict=True):
-            if not self._ledger.vehicles[name].steered and (why[name] or not place.is_free):
-                moved = "it is moved sideways all the time" if name in busy else "it is in no lane for driving"
-                self.undriven[name] = why[name] or moved
-            if name not in busy:
-                self._ledger.vehicles[name].rest = None
+    def _moment(self, rows: IntArray, states: NDArray[Any], dt: float) -> tuple[Moment, LivePlaces]:
+        names = tuple([self._ledger.names[row] for row in rows.tolist()])
+        now, busy = float(self.player.SE_GetSimulationTime()), self._busy()
+        signs = list(zip(names, states["ctrl_type"].tolist(), states["category"].tolist(), strict=True))
+        for sign in signs:
+            if sign not in self._why:
+                self._why[sign] = self._why_not_ours(*sign)
+        why = [self._why[sign] for sign in signs]
+        is_ours = np.array([not reason for reason in why], dtype=np.bool_)
+        touched = busy | self._touched
+        in_action = np.array([name in touched for name in names], dtype=np.bool_) if touched else np.zeros_like(is_ours)
+        places = self._ledger.places(
+            rows, states, now, in_action=in_action, is_ours=is_ours, anew=self.traffic.is_due(now + dt)
+        )
+        for k in np.flatnonzero(~self._ledger.known["steered"][rows] & ~(is_ours & places.is_free)).tolist():
+            moved = "it is moved sideways all the time" if names[k] in busy else "it is in no lane for driving"
+            self.undriven[names[k]] = why[k] or moved
+        self._ledger.rests = {name: rest for name, rest in self._ledger.rests.items() if name in busy}
         self._touched.clear()
-        units = {first: k for k, first in enumerate(dict.fromkeys(self._unit.get(name, name) for name in names))}
-        column_at = {
-            what: np.array([getattr(place, what) for place in places], dtype=kind)
-            for what, kind in (("width", float), ("offset", float), ("base", float), ("heading", float),
-                               ("road", np.int64), ("lane", np.int64), ("is_free", np.bool_))
-        }  # fmt: skip
-        unit = np.array([units[self._unit.get(name, name)] for name in names], dtype=np.int64)
+        if names != self._named:
+            first = {name: self._unit.get(name, name) for name in names}
+            units = {one: k for k, one in enumerate(dict.fromkeys(first.values()))}
+            self._named, self._units = names, np.array([units[first[name]] for name in names], dtype=np.int64)
         moment = Moment(
-            names, column["speed"], column_at["width"], column_at["offset"], column_at["is_free"],
-            np.array([not why[name] for name in names], dtype=np.bool_),
-            np.array([state.category in _TRUCK_CATEGORIES for state in seen.values()], dtype=np.bool_),
-            base=column_at["base"],
+            names, states["speed"], places.width, places.offset, places.is_free, is_ours,
+            np.isin(states["category"], _TRUCK_CATEGORIES), base=places.base,
             places=Places(
-                column["x"], column["y"], column_at["heading"], column_at["road"], column_at["lane"], column["s"],
-                column["length"], column["width"], column["center_x"], unit,
+                states["x"], states["y"], places.heading, places.road, places.lane, states["s"], states["length"],
+                states["width"], states["center_x"], self._units,
             ),
         )  # fmt: skip
         return moment, places

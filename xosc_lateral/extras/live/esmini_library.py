@@ -7,6 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from xosc_lateral.base.errors import SimulationError
 
 
@@ -23,6 +26,9 @@ class ObjectState(c.Structure):
         + [("visibility", c.c_int)]
     )
 
+
+STATE = np.dtype(ObjectState)
+"""The same as a row of an array."""
 
 StoryboardCallback = c.CFUNCTYPE(None, c.c_char_p, c.c_int, c.c_int, c.c_char_p)
 
@@ -69,6 +75,9 @@ class Player:
             typed = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
             setattr(self, name, typed or getattr(library, name))
         self._is_known = False
+        self._ids: list[int] = []
+        self._names: list[str] = []
+        self._states = np.zeros(0, dtype=STATE)
         self.heard: list[tuple[bytes, int, int, bytes]] = []
         """Changes of storyboard elements while `open_player` opened a scenario."""
 
@@ -87,6 +96,20 @@ class Player:
         if not self._is_known:
             self._compare(number)
         return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
+
+    def objects(self) -> tuple[tuple[str, ...], NDArray[Any]]:
+        """Names and states (`STATE`) of all objects that have one, shape (n,). Raises as `state`."""
+        ids = [self.SE_GetId(index) for index in range(self.SE_GetNumberOfObjects())]
+        if ids != self._ids:  # names are asked for once
+            self._ids, self._states = ids, np.zeros(len(ids), dtype=STATE)
+            self._names = [(self.SE_GetObjectName(number) or b"").decode() for number in ids]
+        for number in ids:
+            if self._is_known:
+                break
+            self._compare(number)
+        begin, size, read = self._states.ctypes.data, STATE.itemsize, self.SE_GetObjectState
+        there = [row for row, number in enumerate(ids) if read(number, begin + row * size) == 0]
+        return tuple([self._names[row] for row in there]), self._states[there]
 
     def _compare(self, number: int) -> None:
         """Refuse another structure than ours: longer, shorter, or with something else first."""

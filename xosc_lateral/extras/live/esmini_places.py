@@ -9,13 +9,14 @@ scenario, and it is left alone until that rests.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from xosc_lateral.extras.live.esmini_library import ObjectState
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.extras.live.paths import STANDSTILL
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -43,182 +44,238 @@ class Rest:
     way: float = 0.0  # Beside the maneuver so far. [m]
 
 
-class Lane(NamedTuple):
-    """A vehicle's home lane, where it is."""
+NOWHERE = -2
+"""In place of a road: nothing is known yet."""
 
-    place: tuple[int, int]  # Road and lane.
-    is_lane: bool
-    is_driving: bool
-    left: float  # +1 where +t is to the left of where the vehicle drives, else -1.
-    width: float  # [m]
-    heading: float  # Of travel. [rad]
+KNOWN = np.dtype(
+    [("base", float), ("place", float), ("steered", bool), ("rate", float),
+     ("home_road", np.int64), ("home_from", float), ("home_to", float), ("home", np.int64),
+     ("lane_road", np.int64), ("lane", np.int64), ("is_lane", bool), ("is_driving", bool), ("left", float),
+     ("width", float), ("heading", float),
+     ("told", bool), ("told_road", np.int64), ("told_lane", np.int64), ("told_t", float), ("told_offset", float),
+     ("foreign_until", float), ("foreign_offset", float),
+     ("last_time", float), ("last_road", np.int64), ("last_s", float)]
+)  # fmt: skip
+"""What is known of a vehicle from step to step.
 
+The base [m], the offset from the home lane's centre that it was given [m] (NaN: none yet), whether its driver has it,
+and how fast he moves sideways [m/s]; its home: road, from where to where the lane section goes [m], lane; of that lane,
+when it was looked up last: whether it is one and for driving, +1 where +t is to the left of where the vehicle drives,
+width [m], heading of travel [rad]; what the player was told: road, the lane that the player has it on, t, and offset
+from that lane's centre [m]; until when it is left alone [s], and its offset along t when last seen [m]; where it was a
+step ago: time [s], road, s [m].
+"""
 
-class ToldPlace(NamedTuple):
-    """What the player was told of a vehicle's place."""
-
-    road: int
-    lane: int  # That the player has it on.
-    t: float  # [m]
-    offset_t: float  # From that lane's centre. [m]
-
-
-@dataclass(slots=True)
-class Vehicle:
-    """What is known of one from step to step."""
-
-    base: float | None = None  # [m]
-    home: tuple[int, float, int] | None = None  # Road, where its lane section begins [m], lane.
-    lane: Lane | None = None
-    rest: Rest | None = None
-    told_place: ToldPlace | None = None
-    foreign: tuple[float, float] | None = None  # Left alone until [s]; offset along t when last seen [m].
-    last: tuple[float, int, float] | None = None  # Time [s], road and s [m] a step ago.
-    place: float | None = None  # Offset from the home lane's centre that it was given. [m]
-    steered: bool = False
-    rate: float = 0.0  # Of its driver. [m/s]
+_NEW = np.zeros(1, dtype=KNOWN)
+for _name, _value in (("base", np.nan), ("place", np.nan), ("home_road", NOWHERE), ("lane_road", NOWHERE),
+                      ("foreign_until", -np.inf), ("last_time", np.inf)):  # fmt: skip
+    _NEW[_name] = _value
 
 
-class Place(NamedTuple):
-    """Where a vehicle is, by its home lane."""
+class LivePlaces(NamedTuple):
+    """Where vehicles are, by their home lanes, shape (n,) each."""
 
-    road: int  # -1: none that there is.
-    lane: int
-    centre: float  # Lateral coordinate of the home lane's centre. [m]
-    left: float
-    width: float
-    heading: float
-    offset: float  # From that centre, positive LEFT of travel. [m]
-    base: float  # [m]
-    is_free: bool  # A lane to drive in, and nobody but a driver moves it sideways.
+    road: IntArray  # -1: none that there is.
+    lane: IntArray
+    centre: FloatArray  # Lateral coordinate of the home lane's centre. [m]
+    left: FloatArray
+    width: FloatArray
+    heading: FloatArray
+    offset: FloatArray  # From that centre, positive LEFT of travel. [m]
+    base: FloatArray  # [m]
+    is_free: BoolArray  # A lane to drive in, and nobody but a driver moves it sideways.
 
 
 class Ledger:
-    """Who is where; `say` is told what a user has to know once: vehicle and kind, and a line."""
+    """Who is where; `say` is told what a user has to know once: vehicle and kind, and a line.
+
+    States are rows of the player's (`esmini_library.STATE`); `known` has a row for each of `names`.
+    """
 
     def __init__(self, network: RoadNetwork, say: Callable[[tuple[str, str], str], None]) -> None:
         self.network, self._say = network, say
-        self._roads = {name: index for index, name in enumerate(network.road_ids)}
-        self.vehicles: dict[str, Vehicle] = {}
+        numbers = {int(name): index for index, name in enumerate(network.road_ids) if name.isdecimal()}
+        self._numbers = np.array(sorted(numbers), dtype=np.int64)
+        self._indices = np.array([numbers[number] for number in sorted(numbers)], dtype=np.int64)
+        self.names: tuple[str, ...] = ()
+        self.known = np.zeros(0, dtype=KNOWN)
+        self.rests: dict[str, Rest] = {}
 
-    def road_of(self, state: ObjectState) -> int:
-        """Index of the road; -1: none that there is."""
-        return self._roads.get(str(state.road), -1)
+    def keep(self, names: tuple[str, ...]) -> None:
+        """These vehicles are there: who is gone is forgotten, and begins anew where he is added again."""
+        if names != self.names:
+            before = {name: row for row, name in enumerate(self.names)}
+            old = [before.get(name, len(self.names)) for name in names]
+            self.names, self.known = names, np.concatenate([self.known, _NEW])[old]
+            self.rests = {name: rest for name, rest in self.rests.items() if name in set(names)}
 
-    def left_of(self, state: ObjectState) -> float:
-        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1."""
-        road, network = self.road_of(state), self.network
-        if road < 0:
-            return 1.0
-        left = float(network.travel_direction(road, state.lane))
-        if state.lane == 0 or not network.has_lane_at(road, state.lane, state.s):
-            return left
-        ahead = network.pose_at(road, state.lane, state.s).heading + network.header_offset.heading
-        return left if np.cos(state.h - ahead) >= 0.0 else -left
+    # ---- lanes, of many places ---------------------------------------------------------------------------------------
+    def roads_of(self, states: NDArray[Any]) -> IntArray:
+        """Index of the road of each, shape (n,); -1: none that there is."""
+        if not len(self._numbers):
+            return np.full(len(states), -1)
+        wanted = states["road"].astype(np.int64)
+        at = np.minimum(np.searchsorted(self._numbers, wanted), len(self._numbers) - 1)
+        return np.where(self._numbers[at] == wanted, self._indices[at], -1)
 
-    def apart(self, told_place: ToldPlace, state: ObjectState) -> float:
-        """How far a vehicle is from where the player was told to have it, in the road's course or its lane's. [m]"""
-        if told_place.road != self.road_of(state):
-            return (
-                0.0 if state.lane == told_place.lane and abs(state.offset_t - told_place.offset_t) <= MOVED else np.inf
-            )
-        apart = abs(state.t - told_place.t)
-        return float(min(apart, abs(state.offset_t - told_place.offset_t)) if state.lane == told_place.lane else apart)
-
-    def dropped(self, known: Vehicle, state: ObjectState) -> float | None:
-        """The driver's offset that a maneuver has dropped as it started; None: it has put the vehicle elsewhere. [m]"""
-        if (told_place := known.told_place) is None or self.apart(told_place, state) <= SAME_PLACE:
-            return None if told_place is None else 0.0
-        offset = (known.place or 0.0) - (known.base or 0.0)
-        is_near = self.apart(told_place._replace(t=told_place.t - self.left_of(state) * offset), state) < LANE_STEP
-        return offset if is_near else None
-
-    def room_to_middle(self, state: ObjectState) -> float:
-        """How far a vehicle is from lane 0, on the side of the lane that it is on; below 0: it is across. [m]"""
-        road, side = self.road_of(state), 1 if state.lane > 0 else -1
-        if road < 0 or not self.network.has_lane_at(road, side, state.s):
-            return float("inf")
-        inner = self.network.lane_state_at(road, side, state.s)
-        return float(side * (state.t - inner.centre_t) + 0.5 * inner.width)
-
-    def place(self, name: str, state: ObjectState, now: float, *, in_action: bool, is_ours: bool, anew: bool) -> Place:
-        """Where a vehicle is now [s]; `anew`: lane widths and headings are looked up again."""
-        known, road = self.vehicles.setdefault(name, Vehicle()), self.road_of(state)
-        if in_action:
-            known.told_place = known.foreign = None
-        is_moved = in_action or self._is_foreign(name, known, state, road, now)
-        home = self._home(known, state, road, is_moved)
-        if known.lane is None or anew or known.lane.place != (road, home):
-            known.lane = self._lane(state, road, home)
-        lane, centre = known.lane, state.t - state.offset_t
-        if lane.is_lane and home != state.lane:
-            home_centre, lane_centre = (
-                self.network.lane_state_at(road, one, state.s).centre_t for one in (home, state.lane)
-            )
-            centre += home_centre - lane_centre
-        offset = (state.t - centre) * lane.left
-        if not is_ours:
-            known.base = 0.0
-        elif is_moved or known.base is None or known.place is None:
-            known.base = offset - (known.rest.way if known.rest is not None else 0.0)
-        elif abs(shift := offset - known.place) > LANE_STEP:
-            known.base += shift  # another lane is under it: it stays where it is
-        at_end = self._is_at_an_end(known, state, road, now) and not is_moved
-        if at_end and is_ours:
-            line = f"vehicle {name!r}: at the end of its road from {now:.2f} s on, where its speed still reads"
-            self._say((name, "end"), f"{line} {state.speed:.1f} m/s; it is not steered there")
-        is_across = abs(state.offset_t) > 0.5 * lane.width and self.room_to_middle(state) < 0.0  # as it is written
-        is_free = lane.is_driving and not is_moved and not at_end and not is_across
-        return Place(
-            road if lane.is_lane else -1, home, centre, lane.left, lane.width, lane.heading, offset, known.base, is_free
+    def _has_lane(self, road: IntArray, lane: NDArray[np.integer], s: FloatArray) -> BoolArray:
+        """Whether there is such a lane, shape (n,)."""
+        places = zip(road.tolist(), lane.tolist(), s.tolist(), strict=True)
+        return np.array(
+            [index >= 0 and one != 0 and self.network.has_lane_at(index, one, at) for index, one, at in places],
+            dtype=bool,
         )
 
-    def _home(self, known: Vehicle, state: ObjectState, road: int, is_moved: bool) -> int:
-        """The home lane."""
-        if road < 0:
-            known.home = None
-            return int(state.lane)
-        section, home = float(self.network.section_at(road, state.s)[0]), int(state.lane)
-        if known.home is not None and known.place is not None and known.steered and not is_moved:
-            if known.home[:2] == (road, section):
-                return known.home[2]
-            before = state.t - self.left_of(state) * known.place  # where the centre of the lane that was home goes on
-            home = self.network.lane_at(road, state.s, before).lane or home
-        known.home = (road, section, home)
+    def _headings(self, road: IntArray, lane: NDArray[np.integer], s: FloatArray) -> FloatArray:
+        """Of travel along lanes, in inertial coordinates as the player's. [rad]"""
+        return self.network.lane_to_world(road, lane, s).heading + self.network.header_offset.heading
+
+    def left_of(self, states: NDArray[Any], on_lane: BoolArray | None = None) -> FloatArray:
+        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1; shape (n,)."""
+        road, lane, left = self.roads_of(states), states["lane"], np.ones(len(states))
+        on = road >= 0
+        left[on] = self.network.travel_directions(road[on], lane[on])
+        there = np.flatnonzero(self._has_lane(road, lane, states["s"]) if on_lane is None else on_lane)
+        if len(there):
+            ahead = self._headings(road[there], lane[there], states["s"][there])
+            left[there] *= np.where(np.cos(states["h"][there] - ahead) >= 0.0, 1.0, -1.0)
+        return left
+
+    def room_to_middle(self, states: NDArray[Any]) -> FloatArray:
+        """How far vehicles are from lane 0, on the side of the lane that each is on; below 0: it is across. [m]"""
+        side, room, road = np.where(states["lane"] > 0, 1, -1), np.full(len(states), np.inf), self.roads_of(states)
+        there = np.flatnonzero(self._has_lane(road, side, states["s"]))
+        if len(there):
+            inner = self.network.lane_profile(road[there], side[there], states["s"][there])
+            room[there] = side[there] * (states["t"][there] - inner.centre) + 0.5 * inner.width
+        return room
+
+    # ---- what the player was told ------------------------------------------------------------------------------------
+    def tell(self, rows: IntArray, states: NDArray[Any], t: FloatArray) -> None:
+        """Note what the player is told: t of these vehicles. [m]"""
+        self.known["told"][rows] = True
+        told = {"told_road": self.roads_of(states), "told_lane": states["lane"], "told_t": t,
+                "told_offset": states["offset_t"] + t - states["t"]}  # fmt: skip
+        for name, values in told.items():
+            self.known[name][rows] = values
+
+    def dropped(self, row: int, states: NDArray[Any]) -> float | None:
+        """The driver's offset that a maneuver has dropped as it started; None: it has put the vehicle elsewhere. [m]
+
+        `states`: of this vehicle, shape (1,).
+        """
+        known = self.known[row : row + 1]
+        if not known["told"][0]:
+            return None
+        if self._apart(known, states)[0] <= SAME_PLACE:
+            return 0.0
+        offset = float(np.nan_to_num(known["place"])[0] - np.nan_to_num(known["base"])[0])
+        aside = known.copy()
+        aside["told_t"] -= self.left_of(states) * offset
+        return offset if self._apart(aside, states)[0] < LANE_STEP else None
+
+    def _apart(self, known: NDArray[Any], states: NDArray[Any]) -> FloatArray:
+        """How far vehicles are from where the player was told to have them, in the road's course or the lane's. [m]"""
+        along_road = np.abs(states["t"] - known["told_t"])
+        in_lane = np.abs(states["offset_t"] - known["told_offset"])
+        same_lane = states["lane"] == known["told_lane"]
+        on_another = np.where(same_lane & (in_lane <= MOVED), 0.0, np.inf)
+        apart = np.where(same_lane, np.minimum(along_road, in_lane), along_road)
+        return np.where(known["told_road"] == self.roads_of(states), apart, on_another)
+
+    # ---- where everybody is ------------------------------------------------------------------------------------------
+    def places(
+        self, rows: IntArray, states: NDArray[Any], now: float, *, in_action: BoolArray, is_ours: BoolArray, anew: bool
+    ) -> LivePlaces:
+        """Where vehicles are now [s], `rows` of those that are known; `anew`: lanes are looked up again."""
+        known, road = self.known[rows], self.roads_of(states)
+        names = [self.names[row] for row in rows.tolist()]
+        known["told"] &= ~in_action
+        known["foreign_until"][in_action] = -np.inf
+        is_moved = in_action | self._foreign(names, known, states, road, now)
+        home = self._homes(known, states, road, is_moved)
+        changed = (known["lane_road"] != road) | (known["lane"] != home)
+        self._look_up(known, states, road, home, np.flatnonzero(changed | anew))
+        centre = states["t"] - states["offset_t"]
+        other = np.flatnonzero(known["is_lane"] & (home != states["lane"]))
+        if len(other):
+            lanes = (home[other], states["lane"][other])
+            ours, under = (self.network.lane_centre_t(road[other], lane, states["s"][other]) for lane in lanes)
+            centre[other] += ours - under
+        offset = (states["t"] - centre) * known["left"]
+        shift = np.nan_to_num(offset - known["place"])
+        ways = {name: rest.way for name, rest in self.rests.items() if rest.way}
+        begins = is_moved | np.isnan(known["base"]) | np.isnan(known["place"])
+        way = np.array([ways.get(name, 0.0) for name in names]) if ways else 0.0
+        # another lane is under it: it stays where it is
+        kept = known["base"] + np.where(np.abs(shift) > LANE_STEP, shift, 0.0)
+        known["base"] = np.where(is_ours, np.where(begins, offset - way, kept), 0.0)
+        stays = (known["last_time"] < now) & (known["last_road"] == road) & (known["last_s"] == states["s"])
+        at_end = stays & (np.abs(states["speed"]) > STANDSTILL) & ~is_moved
+        known["last_time"], known["last_road"], known["last_s"] = now, road, states["s"]
+        for k in np.flatnonzero(at_end & is_ours).tolist():
+            line = f"vehicle {names[k]!r}: at the end of its road from {now:.2f} s on, where its speed still reads"
+            self._say((names[k], "end"), f"{line} {states['speed'][k]:.1f} m/s; it is not steered there")
+        is_across = np.abs(states["offset_t"]) > 0.5 * known["width"]
+        if is_across.any():  # as it is written
+            is_across[is_across] = self.room_to_middle(states[is_across]) < 0.0
+        self.known[rows] = known
+        return LivePlaces(
+            np.where(known["is_lane"], road, -1), home, centre, known["left"], known["width"], known["heading"], offset,
+            known["base"], known["is_driving"] & ~is_moved & ~at_end & ~is_across,
+        )  # fmt: skip
+
+    def _homes(self, known: NDArray[Any], states: NDArray[Any], road: IntArray, is_moved: BoolArray) -> IntArray:
+        """The home lanes."""
+        s, lane, was = states["s"], states["lane"].astype(np.int64), known["home_road"].copy()
+        leads_on = (was >= 0) & ~np.isnan(known["place"]) & known["steered"] & ~is_moved
+        inside = (was == road) & (known["home_from"] <= s) & (s < known["home_to"])
+        home = np.where(leads_on & inside, known["home"], lane)
+        for k in np.flatnonzero((road >= 0) & ~inside).tolist():
+            begin, end = self.network.section_at(int(road[k]), float(s[k]))
+            if leads_on[k] and was[k] == road[k] and known["home_from"][k] == begin:
+                home[k] = known["home"][k]
+            elif leads_on[k]:  # where the centre of the lane that was home goes on
+                before = states["t"][k] - self.left_of(states[k : k + 1])[0] * known["place"][k]
+                home[k] = self.network.lane_at(int(road[k]), float(s[k]), float(before)).lane or lane[k]
+            known["home_from"][k], known["home_to"][k] = begin, end
+        known["home_road"], known["home"] = np.where(road >= 0, road, NOWHERE), home
         return home
 
-    def _lane(self, state: ObjectState, road: int, lane: int) -> Lane:
-        network, where = self.network, (road, lane, state.s)
-        if (
-            road < 0
-            or lane == 0
-            or not network.has_lane_at(*where)
-            or not network.has_lane_at(road, state.lane, state.s)
-        ):
-            return Lane((road, lane), False, False, self.left_of(state), 1.0, state.h)
-        width = float(network.lane_width(*where))
-        is_driving = bool(network.lane_index(*where)[0] >= 0) and width > 0.0
-        heading = network.pose_at(*where).heading + network.header_offset.heading  # x and y are inertial
-        return Lane((road, lane), True, is_driving, self.left_of(state), max(width, 1e-3), heading)
+    def _look_up(
+        self, known: NDArray[Any], states: NDArray[Any], road: IntArray, home: IntArray, rows: IntArray
+    ) -> None:
+        """Lanes of some rows."""
+        if not len(rows):
+            return
+        states, road, home = states[rows], road[rows], home[rows]
+        on_lane = self._has_lane(road, states["lane"], states["s"])
+        is_lane, other = on_lane.copy(), home != states["lane"]
+        is_lane[other] &= self._has_lane(road[other], home[other], states["s"][other])
+        width, is_driving, heading = np.ones(len(rows)), np.zeros(len(rows), dtype=np.bool_), states["h"].copy()
+        if len(on := np.flatnonzero(is_lane)):
+            where = (road[on], home[on], states["s"][on])
+            width[on], is_driving[on] = self.network.lane_width(*where), self.network.lane_index(*where)[0] >= 0
+            heading[on] = self._headings(*where)
+        found = {"lane_road": road, "lane": home, "is_lane": is_lane, "is_driving": is_driving & (width > 0.0),
+                 "left": self.left_of(states, on_lane), "width": np.maximum(width, 1e-3),
+                 "heading": heading}  # fmt: skip
+        for name, values in found.items():
+            known[name][rows] = values
 
-    def _is_foreign(self, name: str, known: Vehicle, state: ObjectState, road: int, now: float) -> bool:
-        """Whether something unknown moves it sideways."""
-        told_place, foreign = known.told_place, known.foreign
-        known.told_place = known.foreign = None
-        if told_place is not None and told_place.road == road:
-            if self.apart(told_place, state) > MOVED:
-                foreign = (now + RESTING, state.offset_t)
-                line = f"vehicle {name!r}: moved sideways from {now:.2f} s on, by no lateral action of the scenario"
-                self._say((name, "moved"), f"{line}; it is left alone until that rests")
-        elif foreign is not None and abs(state.offset_t - foreign[1]) > KEPT_PLACE:
-            foreign = (now + RESTING, state.offset_t)
-        if foreign is None or now >= foreign[0]:
-            return False
-        known.foreign = (foreign[0], state.offset_t)
-        return True
-
-    def _is_at_an_end(self, known: Vehicle, state: ObjectState, road: int, now: float) -> bool:
-        """Whether it has a speed and gets no further."""
-        last, known.last = known.last, (now, road, state.s)
-        stays = last is not None and last[0] < now and last[1:] == (road, state.s)
-        return stays and abs(state.speed) > STANDSTILL
+    def _foreign(
+        self, names: Sequence[str], known: NDArray[Any], states: NDArray[Any], road: IntArray, now: float
+    ) -> BoolArray:
+        """Whom something unknown moves sideways."""
+        compared, offset = known["told"] & (known["told_road"] == road), states["offset_t"]
+        begins = compared & (self._apart(known, states) > MOVED)
+        goes_on = ~compared & np.isfinite(known["foreign_until"])
+        goes_on &= np.abs(offset - known["foreign_offset"]) > KEPT_PLACE
+        until = np.where(begins | goes_on, now + RESTING, known["foreign_until"])
+        is_foreign = until > now
+        known["told"], known["foreign_until"] = False, np.where(is_foreign, until, -np.inf)
+        known["foreign_offset"] = offset
+        for k in np.flatnonzero(begins).tolist():
+            line = f"vehicle {names[k]!r}: moved sideways from {now:.2f} s on, by no lateral action of the scenario"
+            self._say((names[k], "moved"), f"{line}; it is left alone until that rests")
+        return np.asarray(is_foreign)
