@@ -50,8 +50,19 @@ VERB_MODULES = {
 OLD_VERBS = {"play": "states"}
 """What was the name of a verb in 0.2 -> its name."""
 
-OLD_OPTIONS = {"convert": {"--for": "--player", "--resample": "--attempts", "--only": "--enrich"}}
+OLD_OPTIONS = {
+    "convert": {"--for": "--player", "--resample": "--attempts", "--only": "--enrich"},
+    "detect": {"--train": "--home"},
+}
 """Verb -> what was the name of an option of it in 0.2 -> its name."""
+
+GONE = {
+    "detect": {
+        "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
+        "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
+    },
+}
+"""Verb -> an option that it had in 0.2 -> what holds in its place."""
 
 TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
@@ -177,6 +188,7 @@ def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     elif first not in VERBS and not first.startswith("-"):
         name = first.replace("_", "-").lower()
         yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
+    yield from (f"{option} is gone: {now}" for option, now in GONE.get(first, {}).items() if option in wrong)
     if "'--profile'" in wrong and "Missing" in wrong:
         yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
     if "not a valid float" in wrong:

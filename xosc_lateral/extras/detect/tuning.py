@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -11,15 +11,16 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector
+from xosc_lateral.drivers.evaluation.spectra import Spectrum
+from xosc_lateral.extras.detect.band import seen_through
+from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector, Learner
 from xosc_lateral.extras.detect.observation import View
 from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
+from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import Scene
 
 Views: TypeAlias = Sequence[tuple[Scene, Sequence[View]]]
 """Scenes, each with what is seen in it."""
-Learner: TypeAlias = Callable[[Iterable[View], str], Detector]
-"""Trains a detector on views of a source, which it may name in errors."""
 
 FOLDS = 5
 """Of a home's vehicles: a trained detector scores those of one fold as trained on the others. The usual number, or that
@@ -35,14 +36,16 @@ class Goal:
 
     text: str
     rate: float | None = None  # [1/h]
-    share: float | None = None  # of cut-ins, before the marking
+    share: float | None = None  # of cut-ins
+    lead: float = 0.0  # before the marking, more than that [s]
 
     @property
     def what(self) -> str:
         """In words."""
         if self.rate is not None:
             return f"at most {self.rate:g} false alarms an hour"
-        return f"the fewest false alarms with {self.text} of the cut-ins seen before the marking"
+        early = f"{self.lead:g} s " if self.lead else ""
+        return f"the fewest false alarms with {self.share:.0%} of the cut-ins seen {early}before the marking"
 
     def number(self, curve: Curve) -> tuple[int, str]:
         """Of the threshold that meets it, and why none does it: empty where one does.
@@ -58,18 +61,21 @@ class Goal:
                 return k, ""
             return k, f"{rates[0]:.1f} an hour at any threshold" if rates[0] else "no alarm at any threshold"
         assert self.share is not None
-        k = curve.seeing(self.share)
-        seen = float(curve.in_time[k])
+        k = curve.seeing(self.share, self.lead)
+        seen = float(curve.seen(self.lead)[k])
         return k, "" if seen >= self.share else f"{seen:.0%} seen at most"
 
 
 def read_goal(text: str) -> Goal:
-    """A goal from ``20/h`` or ``95%``; raises `ValueError`."""
-    match = re.fullmatch(r"(\d+\.?\d*)\s*(/\s*h|%)", text.strip())
+    """A goal from ``20/h``, ``95%`` or ``90% 1s``; raises `ValueError`."""
+    match = re.fullmatch(r"(\d+\.?\d*)\s*(?:/\s*h|(%)(?:\s+(\d+\.?\d*)\s*s)?)", text.strip())
     value = float(match[1]) if match else 0.0
-    if match is None or value <= 0.0 or (match[2] == "%" and value > 100.0):
-        raise ValueError(f"{text!r}: expected false alarms an hour as in 20/h, or cut-ins seen as in 95%")
-    return Goal(text.strip(), share=0.01 * value) if match[2] == "%" else Goal(text.strip(), rate=value)
+    if match is None or value <= 0.0 or (match[2] and value > 100.0):
+        what = "cut-ins seen as in 95%, or in 90% 1s so long before the marking"
+        raise ValueError(f"{text!r}: expected false alarms an hour as in 20/h, or {what}")
+    if match[2]:
+        return Goal(text.strip(), share=0.01 * value, lead=float(match[3] or 0.0))
+    return Goal(text.strip(), rate=value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,26 +178,38 @@ def scored(detector: Detector, views: Views) -> list[Scored]:
     return scored_views
 
 
-def set_at_home(
-    goal: Goal, detector: Detector | Learner, views: Views, source: str, *, within: bool = False
-) -> tuple[Carried, Tally | None]:
-    """The detector with its threshold from home; `within`: also what it does at home itself."""
-    if isinstance(detector, Detector):
-        trained, at_home = detector, scored(detector, views)
-    else:
-        trained, at_home = out_of_fold(detector, views, source)
-    within_source = carried_within(goal, trained, at_home, source) if within else None
-    return carried(goal, trained, at_home, source), within_source
+def tune_all(
+    goal: Goal,
+    chosen: Sequence[Detector | Learner],
+    homes: Sequence[Source],
+    tried_on: Sequence[Source],
+    settings: SourceSettings,
+    recorded: Spectrum | None = None,
+) -> tuple[list[Detector], dict[str, list[Tally]]]:
+    """Every detector with its threshold from each home; and by the home's label what each does there, if it is tried.
 
-
-def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
-    """By detector in the order in which it comes first, then by home."""
-    titles = list(dict.fromkeys(tally.detector.title() for tally in tallies))
-    order = ["", *homes]
-    return sorted(
-        tallies,
-        key=lambda each: (titles.index(each.detector.title()), order.index(each.detector.home_source)),
-    )
+    `recorded`: spectrum of lane keeping through whose band homes are seen. Raises `ValueError`: two homes of one label.
+    """
+    labels = [source.label for source in homes]
+    if twice := sorted({label for label in labels if labels.count(label) > 1}):
+        raise ValueError(f"two homes are called {twice[0]!r}, which rows could not tell apart")
+    found, at_home = list[Detector](), dict[str, list[Tally]]()
+    with_observers = any(isinstance(one, Detector) and one.needs_observer for one in chosen)
+    for source in homes:
+        scenes = list(checked(source))
+        seen = settings if recorded is None else replace(
+            settings, sensor=seen_through(recorded, scenes, settings.sensor)
+        )  # fmt: skip
+        views = [(scene, seen.views(scene, with_observers=with_observers)) for scene in scenes]
+        for one in chosen:
+            if isinstance(one, Detector):
+                trained, every = one, scored(one, views)
+            else:
+                trained, every = out_of_fold(one, views, source.label)
+            found.append(carried(goal, trained, every, source.label))
+            if any(map(source.is_same, tried_on)):
+                at_home.setdefault(source.label, []).append(carried_within(goal, trained, every, source.label))
+    return found, at_home
 
 
 def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, list[Scored]]:
@@ -234,7 +252,7 @@ def carried(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: s
     if goal.share is not None and not len(curve.leads):
         raise NotEnoughDataError(f"{source}: no cut-in, so that no threshold sees {goal.text} of them")
     k, why_not = goal.number(curve)
-    home = Home(source, goal, why_not, float(curve.rate[k]), float(curve.in_time[k]), float(curve.hours.sum()))
+    home = Home(source, goal, why_not, float(curve.rate[k]), float(curve.seen(0.0)[k]), float(curve.hours.sum()))
     return Carried(detector, float(curve.detector.limits[k]), home)
 
 
