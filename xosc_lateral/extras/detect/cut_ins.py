@@ -12,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.numbers import plain
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
@@ -160,9 +161,8 @@ class CutIns(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        rows = [{name: None if value != value else value for name, value in row.items()} for row in self.rows]
         return {"scenario": str(self.scenario), "profile": self.profile, "variations": self.variations.to_dict(),
-                "rows": rows, "provenance": self.provenance()}  # fmt: skip
+                "rows": plain(list(self.rows)), "provenance": self.provenance()}  # fmt: skip
 
     def provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
+from xosc_lateral.base.numbers import plain
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
@@ -155,17 +156,17 @@ class Detection(Result):
                 "goal": self.goal.text,
                 "homes": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.homes],
             }),
-            "rows": [_plain(row) for row in self.rows()], "messages": self.message_records(),
+            "rows": plain(self.rows()), "messages": self.message_records(),
             "curves": [
                 {
                     "source": curve.source,
                     "detector": curve.detector.label(),
                     "quantity": curve.detector.quantity,
                     "threshold": curve.detector.thresholds.tolist(),
-                    "false_alarms_per_hour": _listed(curve.rate),
-                    "seen": _listed(curve.seen()),
-                    "seen_before_marking": _listed(curve.seen(0.0)),
-                    "median_lead_s": _listed(curve.lead(0.5)),
+                    "false_alarms_per_hour": plain(curve.rate.tolist()),
+                    "seen": plain(curve.seen().tolist()),
+                    "seen_before_marking": plain(curve.seen(0.0).tolist()),
+                    "median_lead_s": plain(curve.lead(0.5).tolist()),
                 }
                 for curve in self.curves
             ],
@@ -275,18 +276,6 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
 def is_met(detector: Detector) -> bool:
     """Whether its threshold is its own, or from a home that could set it."""
     return not isinstance(detector, Carried) or detector.home.met
-
-
-def _listed(values: Any) -> list[float | None]:
-    return [None if np.isnan(value) else round(float(value), 6) for value in values]
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN as None, numbers rounded."""
-    return {
-        name: (None if np.isnan(value) else round(value, 6)) if isinstance(value, float) else value
-        for name, value in row.items()
-    }
 
 
 # ---- cells of the table ----

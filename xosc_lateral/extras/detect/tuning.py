@@ -17,7 +17,7 @@ from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector, Learner
 from xosc_lateral.extras.detect.observation import View
 from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
 from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
-from xosc_lateral.extras.detect.tracks import Scene
+from xosc_lateral.extras.detect.tracks import STEP, Scene
 
 Views: TypeAlias = Sequence[tuple[Scene, Sequence[View]]]
 """Scenes, each with what is seen in it."""
@@ -244,62 +244,51 @@ def folds_of(views: Sequence[View], source: str, *, every_changes: bool) -> dict
     return {cluster: number % count for each in (changing, rest) for number, cluster in enumerate(each)}
 
 
-def carried(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Carried:
+def carried(
+    goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str, *, is_source: bool = False
+) -> Carried:
     """The detector with the threshold that meets the goal in these views."""
-    curve = _curve(detector, at_home, source)
+    tally = Tally(AtLimits(detector, _grid(detector, at_home, goal.lead)), source)
+    for each in at_home:
+        tally.count(each.scene, each.view, each.score)
+    curve = tally.curve()
     if not len(curve.hours) or not curve.hours.sum():
         raise NotEnoughDataError(f"{source}: no lane keeping that {detector.name} can be set on")
     if goal.share is not None and not len(curve.leads):
         raise NotEnoughDataError(f"{source}: no cut-in, so that no threshold sees {goal.text} of them")
     k, why_not = goal.number(curve)
-    home = Home(source, goal, why_not, float(curve.rate[k]), float(curve.seen(0.0)[k]), float(curve.hours.sum()))
-    return Carried(detector, float(curve.detector.limits[k]), home)
+    figures = float(curve.rate[k]), float(curve.seen(0.0)[k]), float(curve.hours.sum())
+    return Carried(detector, float(curve.detector.limits[k]), Home(source, goal, why_not, *figures, is_source))
 
 
 def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Tally:
     """What the detector does at home itself: in each fold of vehicles with the threshold that the others give."""
     folds = folds_of([each.view for each in at_home], source, every_changes=goal.share is not None)
-    parts = []
+    whole = carried(goal, detector, at_home, source, is_source=True)
+    tally = Tally(whole, source)
     for fold in sorted(set(folds.values())):
         others = [each for each in at_home if folds[each.view.track.cluster] != fold]
-        carrier = carried(goal, detector, others, source)
-        tally = Tally(
-            Carried(detector, float(carrier.limits[carrier.chosen]), replace(carrier.home, is_source=True)), source
-        )
+        tally.detector = carried(goal, detector, others, source, is_source=True)
         for each in at_home:
             if folds[each.view.track.cluster] == fold:
                 tally.count(each.scene, each.view, each.score)
-        parts.append(tally)
-    every = carried(goal, detector, at_home, source)
-    whole = Tally(Carried(detector, float(every.limits[every.chosen]), replace(every.home, is_source=True)), source)
-    for part in parts:
-        whole.seconds |= part.seconds
-        whole.counts |= part.counts
-        whole.change_clusters += part.change_clusters
-        whole.leads += part.leads
-        whole.cases += part.cases
-    return whole
+    tally.detector = whole
+    return tally
 
 
-def _curve(detector: Detector, at_home: Sequence[Scored], source: str) -> Curve:
-    tally = Tally(AtLimits(detector, _grid(detector, at_home)), source)
-    for each in at_home:
-        tally.count(each.scene, each.view, each.score)
-    return tally.curve()
-
-
-def _grid(detector: Detector, at_home: Sequence[Scored]) -> FloatArray:
+def _grid(detector: Detector, at_home: Sequence[Scored], lead: float) -> FloatArray:
     """Scores at which counts change, none below the most sensitive threshold of the detector's own curve.
 
-    Where nothing moves no threshold alarms, and only that one stands for what a developer would take.
+    Of cut-ins the highest until so long before the marking [s]. Where nothing moves no threshold alarms, and only the
+    most sensitive one stands for what a developer would take.
     """
-    peaks, reached = [], []
+    peaks, reached, early = [], [], round(lead / STEP)
     for each in at_home:
         score = np.where(each.view.watched, each.score, NO_DANGER)
         keeping = each.view.truth.keeping & each.view.watched
         higher = score[1:-1] >= np.maximum(score[:-2], score[2:])
         peaks.append(score[1:-1][higher & keeping[1:-1]])
-        reached += [float(score[c.begin : max(c.crossing, c.begin + 1)].max()) for c in cut_ins_of(each.view)]
+        reached += [float(score[c.begin : max(c.crossing - early, c.begin + 1)].max()) for c in cut_ins_of(each.view)]
     ordered = np.sort(np.concatenate([*peaks, detector.limits[:1]]))[::-1]
     ranks = np.unique(np.round(np.geomspace(1, len(ordered), GRID)).astype(np.int64)) - 1
     below = np.nextafter(np.array(reached), -np.inf)  # alarms are above a limit
