@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import isnan
-from typing import Any
 
 NORMAL_95 = 1.96
 """Standard errors to either side that a 95 % interval has. [-]"""
@@ -28,12 +26,3 @@ def significant(value: float, digits: int) -> float:
 def all_significant(values: Iterable[float], digits: int) -> tuple[float, ...]:
     """Of each. In the unit of the values."""
     return tuple(significant(value, digits) for value in values)
-
-
-def plain(values: Any) -> Any:
-    """Lists, dictionaries and numbers for JSON: rounded to a millionth, in their units, and none that is NaN."""
-    if isinstance(values, dict):
-        return {name: plain(value) for name, value in values.items()}
-    if isinstance(values, list):
-        return [plain(value) for value in values]
-    return (None if isnan(values) else round(values, 6)) if isinstance(values, float) else values

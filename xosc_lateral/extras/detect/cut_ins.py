@@ -12,12 +12,11 @@ import numpy as np
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.numbers import plain
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import View
-from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of
+from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of, plain
 from xosc_lateral.extras.detect.sources import SourceSettings, converted, played_scene
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
 from xosc_lateral.files.atomic import write_atomically

@@ -12,11 +12,10 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.numbers import plain
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
-from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, worst_of
+from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, plain, worst_of
 from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import moves_in_lane
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met

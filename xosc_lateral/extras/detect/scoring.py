@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -249,3 +250,12 @@ class Curve:
 
 def _quantile(values: FloatArray, share: float) -> float:
     return float(np.quantile(values, share)) if len(values) else np.nan
+
+
+def plain(values: Any) -> Any:
+    """Lists, dictionaries and numbers for JSON: rounded to a millionth, in their units, and none that is NaN."""
+    if isinstance(values, dict):
+        return {name: plain(value) for name, value in values.items()}
+    if isinstance(values, list):
+        return [plain(value) for value in values]
+    return (None if np.isnan(values) else round(values, 6)) if isinstance(values, float) else values

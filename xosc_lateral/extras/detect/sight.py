@@ -14,9 +14,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.numbers import plain
 from xosc_lateral.base.texts import aligned
-from xosc_lateral.extras.detect.scoring import INTERVAL_SHARES, RESAMPLES
+from xosc_lateral.extras.detect.scoring import INTERVAL_SHARES, RESAMPLES, plain
 from xosc_lateral.extras.detect.sources import Source, checked
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Rows, Scene
 from xosc_lateral.extras.detect.visibility import Boxes, points_seen, visible_share
