@@ -30,7 +30,7 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.extras.detect.band import keeping_spectrum, seen_through
+from xosc_lateral.extras.detect.band import band_in, keeping_spectrum, seen_through
 from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
 from xosc_lateral.extras.detect.logistic import (
     ROW_STRIDE,
@@ -48,6 +48,7 @@ from xosc_lateral.extras.detect.tuning import AtLimits, Views, carried, out_of_f
 from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
+from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.surroundings.lane_order import RoadLanes
 
@@ -194,13 +195,13 @@ def homes_of(wheel: Path, half: int, seed: int, names: Sequence[str]) -> Iterato
                     yield home, views_without_observers(scenes, sensor)
     for home in HOMES[2:4]:
         if home in names:
-            yield home, shipped_home(wheel, seed, banded=home == HOMES[3])
+            yield home, shipped_home(seed, banded=home == HOMES[3])
     if "real" in names:
         yield "real", real_half(wheel, half)
 
 
 @cache
-def shipped_home(wheel: Path, seed: int, *, banded: bool) -> Views:
+def shipped_home(seed: int, *, banded: bool) -> Views:
     """Templates driven by a shipped profile: as they are, or varied like it and seen as its recording shows traffic."""
     with TemporaryDirectory() as name:
         folder, scenes = Path(name), list[Scene]()
@@ -209,9 +210,8 @@ def shipped_home(wheel: Path, seed: int, *, banded: bool) -> Views:
             _, lifelike = sources_of(
                 varied_scenarios(folder, SHIPPED, seed), SourceSettings(convert, 1, (SHIPPED,), "none")
             )
-            scenes = list(checked(lifelike))
-            band = keeping_spectrum((one for scene in recorded(wheel) for one in scene.tracks), SHIPPED)
-            return views_without_observers(scenes, seen_through(band, scenes, PERFECT_SENSOR))
+            sensor = dataclasses.replace(PERFECT_SENSOR, band=band_in(read_profile(SHIPPED)))
+            return views_without_observers(checked(lifelike), sensor)
         for template, count in SCENARIOS.items():
             scenario, _ = xl.write_template(template, folder / template)
             _, lifelike = sources_of(scenario, SourceSettings(convert, count, (SHIPPED,), "none"))
@@ -240,13 +240,15 @@ def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequenc
         }  # fmt: skip
 
 
-def results(wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
+def results(
+    wheel: Path, half: int, seed: int, homes: Sequence[str], detectors: Sequence[str], runs: Sequence[Views]
+) -> Iterator[dict[str, Any]]:
     """A row for each home, detector and goal."""
     goals = [read_goal(text) for text in GOALS]
     tested = real_half(wheel, 1 - half)
     for home, views in homes_of(wheel, half, seed, homes):
         key = {"half": half, "seed": seed, "home": home}
-        for one in (*RULES, *LEARNERS):
+        for one in (*RULES, *(name for name in LEARNERS if name in detectors)):
             name = one.title() if isinstance(one, Detector) else one
             if home == "real" and seed and (isinstance(one, Detector) or one == "logistic"):
                 continue  # nothing in it is drawn
@@ -330,13 +332,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="*", default=[0, 1, 2, 3, 4])
     parser.add_argument("--halves", type=int, nargs="*", default=[0, 1])
     parser.add_argument("--homes", nargs="+", choices=(*HOMES, "unsmoothed"), default=HOMES)
+    parser.add_argument("--learners", nargs="*", choices=LEARNERS, default=LEARNERS)
     parser.add_argument("--results", type=Path, default=Path("transfer.jsonl"))
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     runs = [views_without_observers([scene]) for path in args.openacc for scene in run_scenes(path)]
     for seed in args.seeds:
         for half in args.halves:
-            for row in results(args.wheel, half, seed, args.homes, runs):
+            for row in results(args.wheel, half, seed, args.homes, args.learners, runs):
                 with args.results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row) + "\n")
     rows = [json.loads(line) for line in args.results.read_text(encoding="utf-8").splitlines()]

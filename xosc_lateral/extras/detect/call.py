@@ -50,9 +50,9 @@ def detect(
     tune: Annotated[str, flag(metavar="N/h|N%|N% Ns",
         help="Set thresholds on the homes: at most so many false alarms an hour (20/h), or so many cut-ins seen before "
         "the marking (95%), or so long before it (90% 1s).")] = "",
-    band_of: Annotated[PathLike | None, flag("--band-of", kind=Path | None, metavar="RECORDING", show_default=False,
-        help="With --tune: see the homes through the band of a recording, which shows less of fast "
-        "movement.")] = None,
+    band_of: Annotated[ProfileLike | None, flag("--band-of", kind=str | None, metavar="RECORDING|PROFILE",
+        show_default=False, help="With --tune: see the homes through the band of a recording, or of that of a profile, "
+        "which shows less of fast movement.")] = None,
     like: Annotated[ProfileLike | None, flag(kind=str | None, metavar="PROFILE", show_default=False,
         help="A table of cut-ins instead: the scenario's lane changes varied as by `vary --like`, a drive for each "
         "set.")] = None,
@@ -103,7 +103,7 @@ def detect(
     """
     from dataclasses import replace as replaced
 
-    from xosc_lateral.extras.detect.band import keeping_spectrum
+    from xosc_lateral.extras.detect.band import band_in, keeping_spectrum
     from xosc_lateral.extras.detect.cut_ins import cut_ins_like
     from xosc_lateral.extras.detect.detection import Detection, count_all
     from xosc_lateral.extras.detect.logistic import TRAINED_RULE, read_detectors, train_all
@@ -147,22 +147,26 @@ def detect(
         settings = settings.on(Path(road))
     as_they_are = replaced(settings, variants=0)
     looked_at = [source for one in inputs for source in sources_of(one.path, settings.on(one.road, one.held))]
-    bands = () if band_of is None else (Path(band_of),)
+    bands = [Path(one) for one in (band_of,) if isinstance(one, str | Path)]
+    bands = [one for one in bands if one.is_dir() or one.suffix not in ("", ".json")]  # others are profiles
     files = [path for path in (*paths, *home_paths, *bands) if path.is_file()]
     if sight:
         return sight_of(looked_at, seed, files)
     homes = [one for path in home_paths for one in sources_of(path, as_they_are if goal is None else settings)]
-    at_home: dict[str, list[Tally]] = {}
+    done_there: dict[str, list[Tally]] = {}
     if goal is None:
         tried = train_all(chosen, homes, settings)
     else:
-        recorded = None
+        at_home, recorded = settings, None
+        if band_of is not None and not bands:
+            through = band_in(given_profile(band_of, library))
+            at_home = replaced(settings, sensor=replaced(settings.sensor, band=through))
         for source in [one for path in bands for one in sources_of(path, as_they_are)]:
             recorded = keeping_spectrum((one for scene in checked(source) for one in scene.tracks), source.label)
-        tried, at_home = tune_all(goal, chosen, homes, looked_at, settings, recorded)
+        tried, done_there = tune_all(goal, chosen, homes, looked_at, at_home, recorded)
     if like is not None:
         part, law = (1, 1) if shard is None else read_shard(shard), given_profile(like, library)
         where = None if keep is None else Path(keep)
         return cut_ins_like(paths[0], law, tried, settings, count=count, replaces=replace, part=part, keep=where)
-    tallies, still = count_all(tried, looked_at, at_home, homes, settings)
+    tallies, still = count_all(tried, looked_at, done_there, homes, settings)
     return Detection(tallies, looked_at, settings.sensor, seed, still, files, goal, homes if goal else ())
