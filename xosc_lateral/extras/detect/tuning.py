@@ -96,28 +96,18 @@ class Home:
         return not self.why_not
 
 
-class Carried(Detector):
-    """A detector with a threshold from home."""
+class AtLimits(Detector):
+    """A detector at some limits alone, increasing."""
 
-    def __init__(self, detector: Detector, limit: float, home: Home) -> None:
-        self.detector, self.home = detector, home
+    def __init__(self, detector: Detector, limits: FloatArray, chosen: int = 0) -> None:
+        self.detector, self._limits, self._chosen = detector, limits, chosen
         self.needs_observer, self.growing = detector.needs_observer, detector.growing  # type: ignore[misc]
         self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
-        self.home_source = home.source
-        self.threshold = detector.threshold_of(limit)
-        known_limits = np.array([]) if home.is_source else detector.limits
-        self._limits = np.unique(np.append(known_limits, limit))
-        self._chosen = int(np.searchsorted(self._limits, limit))
 
     @property
     def limits(self) -> FloatArray:
         """See `Detector`."""
         return self._limits
-
-    @property
-    def thresholds(self) -> FloatArray:
-        """See `Detector`."""
-        return np.array([self.detector.threshold_of(limit) for limit in self._limits])
 
     @property
     def chosen(self) -> int:
@@ -128,6 +118,20 @@ class Carried(Detector):
         """See `Detector`."""
         return self.detector.scores(scene, views)
 
+
+class Carried(AtLimits):
+    """A detector with a threshold from home."""
+
+    def __init__(self, detector: Detector, limit: float, home: Home) -> None:
+        limits = np.unique(np.append(np.array([]) if home.is_source else detector.limits, limit))
+        super().__init__(detector, limits, int(np.searchsorted(limits, limit)))
+        self.threshold, self.home, self.home_source = detector.threshold_of(limit), home, home.source
+
+    @property
+    def thresholds(self) -> FloatArray:
+        """See `Detector`."""
+        return np.array([self.detector.threshold_of(limit) for limit in self._limits])
+
     def label(self) -> str:
         """See `Detector`."""
         return f"{self.detector.title()}, set on {self.home.source}"
@@ -135,28 +139,6 @@ class Carried(Detector):
     def title(self) -> str:
         """See `Detector`."""
         return self.detector.title()
-
-
-class AtLimits(Detector):
-    """A detector at some limits alone, increasing."""
-
-    def __init__(self, detector: Detector, limits: FloatArray) -> None:
-        self.detector, self._limits = detector, limits
-        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
-
-    @property
-    def limits(self) -> FloatArray:
-        """See `Detector`."""
-        return self._limits
-
-    @property
-    def chosen(self) -> int:
-        """See `Detector`."""
-        return 0
-
-    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
-        """See `Detector`."""
-        return self.detector.scores(scene, views)
 
 
 @dataclass(frozen=True, eq=False)
