@@ -4,7 +4,7 @@
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`; FILEs are runs of OpenACC's AstaZero campaign. Both halves of the recording's
 vehicles are home once, and tested once. Nominal and lifelike homes are the same scenarios: our templates, varied like
-the home half's lane changes (`fit --maneuvers`, `vary --like`); lifelike ones are driven by a profile of that half, and
+the home half's lane changes (`fit --maneuvers`, `vary --like --replace`); lifelike ones are driven by a profile of that half, and
 seen through its band (`detect --band-of`; "unsmoothed": as they are). Shipped homes take no recording: templates as
 they are, driven by `motorway`; "banded": varied like `motorway`, and seen through the band that its record holds. GNSS
 runs hold no cut-in: alarms there are false. Results are added to FILE as they come; `docs/validation/detectors.md`.
@@ -164,7 +164,7 @@ def varied_scenarios(folder: Path, profile: str, seed: int) -> Path:
     """Templates with lane changes like a profile's: the folder of their parameter distributions."""
     for name, count in SCENARIOS.items():
         scenario, _ = xl.write_template(name, folder / "templates" / name)
-        xl.vary(scenario, folder / "home" / name, like=profile, count=count, seed=seed)
+        xl.vary(scenario, folder / "home" / name, like=profile, count=count, seed=seed, replace=True)
     return folder / "home"
 
 
