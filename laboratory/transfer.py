@@ -4,10 +4,11 @@
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`; FILEs are runs of OpenACC's AstaZero campaign. Both halves of the recording's
 vehicles are home once, and tested once. Nominal and lifelike homes are the same scenarios: our templates, varied like
-the home half's lane changes (`fit --maneuvers`, `vary --like --replace`); lifelike ones are driven by a profile of that half, and
-seen through its band (`detect --band-of`; "unsmoothed": as they are). Shipped homes take no recording: templates as
-they are, driven by `motorway`; "banded": varied like `motorway`, and seen through the band that its record holds. GNSS
-runs hold no cut-in: alarms there are false. Results are added to FILE as they come; `docs/validation/detectors.md`.
+the home half's lane changes (`fit --maneuvers`, `vary --like --replace`); lifelike ones are driven by a profile of that
+half, and seen through its band (`detect --band-of`; "unsmoothed": as they are). Shipped homes take no recording:
+templates as they are, driven by `motorway`; "banded": varied like `motorway`, and seen through the band that its record
+holds. GNSS runs hold no cut-in: alarms there are false. Results are added to FILE as they come;
+`docs/validation/detectors.md`.
 """
 
 from __future__ import annotations
