@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from examples.driver_simulator import simulate_drive
 from tests.kit.profiles import as_drive
+from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, all_runs
-from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models import autoregressive_coarse as fit_coarse
 from xosc_lateral.drivers.fitting.models import autoregressive_fit as fitting
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import simulate

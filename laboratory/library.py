@@ -42,6 +42,7 @@ from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_moveme
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
+from xosc_lateral.extras.detect.band import LEAST_FREQUENCY, SEEN
 from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.extras.recordings.importers.openacc import import_openacc
 from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
@@ -106,9 +107,25 @@ def build_library(source: Path, gnss: Sequence[Path], *, model: str = "best") ->
     seen = Seen(runs, *driver_runs(runs, drives), fast)
     inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
     known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
-    population = replace(_population_profile(seen, known, model), maneuvers=read_maneuvers(source))
-    profiles = [replace(population, beside=ANSWERS), _single_profile(seen, kind, known, model), rural]
+    population = replace(_population_profile(seen, known, model), maneuvers=read_maneuvers(source), beside=ANSWERS)
+    fit = {**population.provenance.fit, SEEN: seen_through(population, runs)}
+    population = replace(population, provenance=replace(population.provenance, fit=fit))
+    profiles = [population, _single_profile(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
+
+
+def seen_through(profile: DriverProfile, runs: Sequence[Run]) -> dict[str, list[float]]:
+    """Which share of the amplitude of movement like the profile's a recording of it shows, above 0.1 Hz. [Hz], [-]"""
+    real, made = (
+        spectrum(paths, STEP)
+        for paths in ([run.offset for run in runs], sample_runs(profile, runs, SEED, same_start=False))
+    )
+    rows = (real.frequency > LEAST_FREQUENCY) & np.isin(real.frequency, made.frequency)
+    ratio = real.density[rows] / made.density[np.isin(made.frequency, real.frequency[rows])]
+    return {
+        "frequency_hz": [round(float(hertz), 4) for hertz in real.frequency[rows]],
+        "gain": [round(float(gain), 3) for gain in np.minimum(np.sqrt(ratio), 1.0)],
+    }
 
 
 def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:

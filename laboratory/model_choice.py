@@ -19,9 +19,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.drivers.drives.drive import Run, all_runs
 from xosc_lateral.drivers.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.drivers.evaluation.metrics import METRICS, snippet_distances, split_groups
+from xosc_lateral.drivers.evaluation.metrics import METRICS, split_groups
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive, matched, simulate
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level

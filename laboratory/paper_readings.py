@@ -12,8 +12,8 @@ import argparse
 
 import numpy as np
 
+from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.drivers.drives.drive import all_runs
-from xosc_lateral.drivers.evaluation.metrics import snippet_distances
 from xosc_lateral.drivers.fitting.models.two_level import fit_two_level, split_levels
 from xosc_lateral.drivers.model.core.base import Start
 from xosc_lateral.drivers.model.core.two_level.model import TwoLevelSettings

@@ -4,9 +4,11 @@
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`; FILEs are runs of OpenACC's AstaZero campaign. Both halves of the recording's
 vehicles are home once, and tested once. Nominal and lifelike homes are the same scenarios: our templates, varied like
-the home half's lane changes (`fit --maneuvers`, `vary --like`); lifelike ones are driven by a profile of that half, and
-seen through its band (`detect --band-of`; "unsmoothed": as they are). GNSS runs hold no cut-in: alarms there are false.
-Results are added to FILE as they come; `docs/validation/detectors.md`.
+the home half's lane changes (`fit --maneuvers`, `vary --like --replace`); lifelike ones are driven by a profile of that
+half, and seen through its band (`detect --band-of`; "unsmoothed": as they are). Shipped homes take no recording:
+templates as they are, driven by `motorway`; "banded": varied like `motorway`, and seen through the band that its record
+holds. GNSS runs hold no cut-in: alarms there are false. Results are added to FILE as they come;
+`docs/validation/detectors.md`.
 """
 
 from __future__ import annotations
@@ -29,9 +31,8 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.extras.detect.band import keeping_spectrum
-from xosc_lateral.extras.detect.call import seen_through
-from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, TimeToLine, WanderingZone
+from xosc_lateral.extras.detect.band import band_in, keeping_spectrum, seen_through
+from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
 from xosc_lateral.extras.detect.logistic import (
     ROW_STRIDE,
     Logistic,
@@ -44,19 +45,21 @@ from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View,
 from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
 from xosc_lateral.extras.detect.tracks import STEP, Scene
-from xosc_lateral.extras.detect.tuning import AtLimits, Learner, Views, carried, out_of_fold, read_goal, scored
+from xosc_lateral.extras.detect.tuning import AtLimits, Views, carried, out_of_fold, read_goal, scored
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
 from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
+from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
 FloatArray = NDArray[np.float64]
 
 SCENARIOS = {"cut-in": 20, "overtake-truck": 20, "dense-traffic": 4}
 """Templates, and how many of each: 68 lane changes."""
-GOALS = ("20/h", "95%")
-HOMES = ("nominal", "lifelike", "real")
+GOALS = ("20/h", "90% 1s", "95%")
+HOMES = ("nominal", "lifelike", "shipped", "shipped, banded", "real")
+SHIPPED = "motorway"
 RULES: Sequence[Detector] = (LateralSpeed(), WanderingZone(), TimeToLine())
 WINDOW = round(2.0 / STEP)
 """Of the network. [rows]"""
@@ -158,11 +161,11 @@ def real_half(wheel: Path, half: int) -> Views:
     return views_without_observers(half_of(recorded(wheel), half))
 
 
-def varied_scenarios(folder: Path, profile: Path, seed: int) -> Path:
+def varied_scenarios(folder: Path, profile: str, seed: int) -> Path:
     """Templates with lane changes like a profile's: the folder of their parameter distributions."""
     for name, count in SCENARIOS.items():
         scenario, _ = xl.write_template(name, folder / "templates" / name)
-        xl.vary(scenario, folder / "home" / name, like=profile, count=count, seed=seed)
+        xl.vary(scenario, folder / "home" / name, like=profile, count=count, seed=seed, replace=True)
     return folder / "home"
 
 
@@ -174,10 +177,13 @@ def homes_of(wheel: Path, half: int, seed: int, names: Sequence[str]) -> Iterato
     """Those of `HOMES` that are asked for, and "unsmoothed"."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        xl.write_profile(profile_of(wheel, half), folder / "profile.json")
-        scenarios = varied_scenarios(folder, folder / "profile.json", seed)
         convert = dataclasses.replace(ConvertSettings.of(seed=seed, allow=[str(folder)]), step=STEP)  # as it is played
-        nominal, lifelike = sources_of(scenarios, SourceSettings(convert, 1, (str(folder / "profile.json"),), "none"))
+        if {"nominal", "lifelike", "unsmoothed"} & set(names):
+            xl.write_profile(profile_of(wheel, half), folder / "profile.json")
+            scenarios = varied_scenarios(folder, str(folder / "profile.json"), seed)
+            nominal, lifelike = sources_of(
+                scenarios, SourceSettings(convert, 1, (str(folder / "profile.json"),), "none")
+            )
         if "nominal" in names:
             yield "nominal", views_without_observers(checked(nominal))
         if {"lifelike", "unsmoothed"} & set(names):
@@ -188,8 +194,30 @@ def homes_of(wheel: Path, half: int, seed: int, names: Sequence[str]) -> Iterato
             ):  # fmt: skip
                 if home in names:
                     yield home, views_without_observers(scenes, sensor)
+    for home in HOMES[2:4]:
+        if home in names:
+            yield home, shipped_home(seed, banded=home == HOMES[3])
     if "real" in names:
         yield "real", real_half(wheel, half)
+
+
+@cache
+def shipped_home(seed: int, *, banded: bool) -> Views:
+    """Templates driven by a shipped profile: as they are, or varied like it and seen as its recording shows traffic."""
+    with TemporaryDirectory() as name:
+        folder, scenes = Path(name), list[Scene]()
+        convert = dataclasses.replace(ConvertSettings.of(seed=seed, allow=[name]), step=STEP)
+        if banded:
+            _, lifelike = sources_of(
+                varied_scenarios(folder, SHIPPED, seed), SourceSettings(convert, 1, (SHIPPED,), "none")
+            )
+            sensor = dataclasses.replace(PERFECT_SENSOR, band=band_in(read_profile(SHIPPED)))
+            return views_without_observers(checked(lifelike), sensor)
+        for template, count in SCENARIOS.items():
+            scenario, _ = xl.write_template(template, folder / template)
+            _, lifelike = sources_of(scenario, SourceSettings(convert, count, (SHIPPED,), "none"))
+            scenes += checked(lifelike)
+        return views_without_observers(scenes)
 
 
 def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
@@ -208,18 +236,20 @@ def at(detector: Detector, limits: dict[str, float], views: Views, runs: Sequenc
         k = int(np.searchsorted(ordered, limit))
         yield {
             "goal": goal, "threshold": detector.threshold_of(limit), "rate": float(curve.rate[k]),
-            "low": float(low_high[0, k]), "high": float(low_high[1, k]), "seen": float(curve.in_time[k]),
+            "low": float(low_high[0, k]), "high": float(low_high[1, k]), "seen": float(curve.seen(0.0)[k]),
             "lead": float(curve.lead(0.5)[k]), "runs": [float(rates[k]) for rates in calm],
         }  # fmt: skip
 
 
-def results(wheel: Path, half: int, seed: int, homes: Sequence[str], runs: Sequence[Views]) -> Iterator[dict[str, Any]]:
+def results(
+    wheel: Path, half: int, seed: int, homes: Sequence[str], detectors: Sequence[str], runs: Sequence[Views]
+) -> Iterator[dict[str, Any]]:
     """A row for each home, detector and goal."""
     goals = [read_goal(text) for text in GOALS]
     tested = real_half(wheel, 1 - half)
     for home, views in homes_of(wheel, half, seed, homes):
         key = {"half": half, "seed": seed, "home": home}
-        for one in (*RULES, *LEARNERS):
+        for one in (*RULES, *(name for name in LEARNERS if name in detectors)):
             name = one.title() if isinstance(one, Detector) else one
             if home == "real" and seed and (isinstance(one, Detector) or one == "logistic"):
                 continue  # nothing in it is drawn
@@ -303,20 +333,21 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="*", default=[0, 1, 2, 3, 4])
     parser.add_argument("--halves", type=int, nargs="*", default=[0, 1])
     parser.add_argument("--homes", nargs="+", choices=(*HOMES, "unsmoothed"), default=HOMES)
+    parser.add_argument("--learners", nargs="*", choices=LEARNERS, default=LEARNERS)
     parser.add_argument("--results", type=Path, default=Path("transfer.jsonl"))
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     runs = [views_without_observers([scene]) for path in args.openacc for scene in run_scenes(path)]
     for seed in args.seeds:
         for half in args.halves:
-            for row in results(args.wheel, half, seed, args.homes, runs):
+            for row in results(args.wheel, half, seed, args.homes, args.learners, runs):
                 with args.results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row) + "\n")
     rows = [json.loads(line) for line in args.results.read_text(encoding="utf-8").splitlines()]
-    rows.sort(key=lambda row: [*HOMES[:2], "unsmoothed", HOMES[2]].index(row["home"]))
+    rows.sort(key=lambda row: [*HOMES[:2], "unsmoothed", *HOMES[2:]].index(row["home"]))
     done = sorted({(row["half"], row["seed"]) for row in rows})
     print(f"{len(done)} of home half and seed: {done}")
-    for goal, marker in (("20/h", "rate"), ("95%", "share"), ("p = 0.5", "half")):
+    for goal, marker in (("20/h", "rate"), ("90% 1s", "early"), ("95%", "share"), ("p = 0.5", "half")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
     show(told_lines(rows), args.write, "transfer-told")
     if any(row.get("runs") for row in rows):

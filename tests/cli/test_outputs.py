@@ -293,6 +293,6 @@ def test_a_damaged_table_is_refused_in_words_of_our_own(tmp_path, capsys, name, 
 def test_what_went_says_what_takes_its_place(capsys: pytest.CaptureFixture[str]) -> None:
     for option, today in GONE.items():
         assert main(["convert", "cut-in.xosc", option, "x"]) == 2
-        assert f"{option} is {today} now" in capsys.readouterr().err
+        assert f"{option} is gone: {today}" in capsys.readouterr().err
     assert main(["play", "cut-in.xosc"]) == 2
     assert "'states' does that" in capsys.readouterr().err

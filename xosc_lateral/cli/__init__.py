@@ -51,8 +51,11 @@ GONE = {
     "--entity": "-p NAME=PROFILE", "--road-path": "--road FOLDER", "--cluster": "--jobs ADDRESS",
     "--player-library": "--player LIBRARY", "--job-timeout": "--job-limit 600s", "--job-memory": "--job-limit 4000MB",
     "--log-json": "--json --verbose", "--for": "--player", "--resample": "--attempts", "--only": "--enrich",
+    "--train": "--home",
+    "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
+    "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
 }  # fmt: skip
-"""What was an option of `convert` or of others -> what takes its place."""
+"""What was an option of a verb -> what takes its place."""
 
 TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
@@ -161,7 +164,7 @@ def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     elif first not in VERBS and not first.startswith("-"):
         name = first.replace("_", "-").lower()
         yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
-    yield from (f"{old} is {new} now" for old, new in GONE.items() if f"No such option: {old}" in wrong)
+    yield from (f"{old} is gone: {today}" for old, today in GONE.items() if f"No such option: {old}" in wrong)
     if "'--profile'" in wrong and "Missing" in wrong:
         yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
     if "not a valid float" in wrong:

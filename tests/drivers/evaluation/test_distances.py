@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import wasserstein_distance
 
+from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.evaluation.metrics import (
     METRICS,
     Distances,
     mean_distances,
     metric_distances,
-    snippet_distances,
     snippet_metrics,
     split_groups,
     wasserstein,

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import wasserstein_distance
 
 from laboratory.comparison import compare_profiles, driver_distances
+from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.resampling import STEP
@@ -18,7 +19,6 @@ from xosc_lateral.drivers.evaluation.metrics import (
     cut_snippets,
     free_runs,
     metric_distances,
-    snippet_distances,
     snippet_metrics,
     split_groups,
     wasserstein,

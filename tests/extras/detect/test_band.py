@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, track
+from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.band import Band, band_of, keeping_spectrum
+from xosc_lateral.extras.detect.band import SEEN, Band, band_in, band_of, keeping_spectrum
 from xosc_lateral.extras.detect.tracks import STEP
+from xosc_lateral.files.profiles import read_profile
 
 CORNER = 0.3  # of the known filter [Hz]
 
@@ -57,6 +60,19 @@ def test_home_that_does_not_move_is_seen_as_it_is():
     assert band_of(keeping_spectrum(tracks(0, smoothed=True), "r"), still).gain.min() == pytest.approx(1.0)
 
 
+def test_a_shipped_profile_holds_the_band_of_its_recording_and_nothing_else_is_taken_for_one():
+    """Cameras beside a motorway, smoothed by the provider: half the amplitude at 0.22 Hz, a tenth at 0.7 Hz."""
+    shipped = read_profile("motorway")
+    gain = band_in(shipped).at(np.array([0.05, 0.2239, 0.7079, 3.0]))
+    np.testing.assert_allclose(gain, [1.0, 0.5, 0.1, 0.07], atol=0.05)
+    with pytest.raises(DriverProfileError, match="rural does not hold the band of its recording"):
+        band_in(read_profile("rural"))
+    for seen in (7, {}, {"frequency_hz": [0.2, 0.1], "gain": [1, 1]}, {"frequency_hz": [0.2], "gain": [1.5]},
+                 {"frequency_hz": [], "gain": []}, {"frequency_hz": [0.2, 0.3], "gain": [1]}):  # fmt: skip
+        with pytest.raises(DriverProfileError, match="does not hold"):
+            band_in(replace(shipped, provenance=replace(shipped.provenance, fit={SEEN: seen})))
+
+
 def test_through_a_smoother_recording_s_band_thresholds_become_more_sensitive(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     xl.write_template("overtake-truck", tmp_path / "home")
@@ -70,7 +86,7 @@ def test_through_a_smoother_recording_s_band_thresholds_become_more_sensitive(tm
     found = {
         band: xl.detect("recording.csv", home="home", variants=2, ego="none", tune="20/h", detectors="lateral-speed",
                         band_of=band).rows()[1]["threshold"]
-        for band in (None, "recording.csv")
+        for band in (None, "recording.csv", "motorway")
     }  # fmt: skip
-    assert found["recording.csv"] < 0.95 * found[None]
+    assert found["recording.csv"] < 0.95 * found[None] and found["motorway"] < 0.95 * found[None]
     assert main(["detect", "recording.csv", "--band-of", "recording.csv"]) == 2

@@ -135,7 +135,7 @@ def test_a_folder_is_read_without_its_catalogs_and_trains_what_another_source_te
         xl.convert("cut-in.xosc", f"many/{number}.xosc", ego="none", seed=number)
     catalog = '<OpenSCENARIO><FileHeader/><Catalog name="c"/></OpenSCENARIO>'
     (folder / "many" / "catalog.xosc").write_text(catalog)
-    result = xl.detect("many", detectors="logistic:threshold=0.9", train="cut-in.xosc", ego="none")
+    result = xl.detect("many", detectors="logistic:threshold=0.9", home="cut-in.xosc", ego="none")
     found = row(result, "many", "logistic")
     assert found["cut_ins"] == 3 and found["threshold"] == 0.9 and found["seen"] == 1.0
 
@@ -163,7 +163,7 @@ def test_a_distribution_stands_for_its_scenarios_each_with_offsets_of_its_own(tm
     ("words", "code", "what"),
     [
         (["nowhere.xosc"], 1, "nowhere.xosc: no such file or folder"),
-        (["cut-in.xosc", "--detector", "logistic"], 2, "logistic has to be trained: name a source with --train"),
+        (["cut-in.xosc", "--detector", "logistic"], 2, "logistic has to be trained: name a source with --home"),
         (["cut-in.xosc", "--detector", "lateral-speed:speed=1"], 2, "lateral-speed has threshold=VALUE, hold=VALUE"),
         (["cut-in.xosc", "--detector", "lateral-speed:hold=x"], 2, "expected a number from 0 to 10"),
         (["cut-in.xosc", "--sensor", "rate=100"], 2, "expected a number from 0.5 to 20"),

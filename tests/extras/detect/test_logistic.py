@@ -52,7 +52,7 @@ def test_trained_on_lane_centre_traffic_it_takes_every_weave_for_a_cut_in_and_on
             tally.add(one, views_of(one, PERFECT_SENSOR, 0))
         curve = tally.curve()
         rates.append(float(curve.rate[curve.detector.chosen]))
-        shares.append(float(curve.in_time[curve.detector.chosen]))
+        shares.append(float(curve.seen(0.0)[curve.detector.chosen]))
     assert shares == [1.0, 1.0]
     assert rates[0] > 100.0 and rates[1] < 0.2 * rates[0]
 

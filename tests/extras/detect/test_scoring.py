@@ -70,7 +70,7 @@ def test_leads_are_those_of_a_lane_change_in_closed_form():
     made = scene(track(lane_change(time, 25.0, 6.0)))
     for detector in (MarkingDistance(threshold=0.3), WanderingZone()):
         curve = curve_of(detector, made)
-        assert curve.seen[detector.chosen] == 1.0 and len(curve.leads) == 1
+        assert curve.seen()[detector.chosen] == 1.0 and len(curve.leads) == 1
         towards = detector.threshold
         if isinstance(detector, MarkingDistance):
             towards += 0.5 * LANE - 0.95

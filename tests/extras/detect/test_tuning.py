@@ -40,7 +40,7 @@ def at(detector, views) -> tuple[float, float]:
     for each in views:
         tally.add(*each)
     curve = tally.curve()
-    return float(curve.rate[detector.chosen]), float(curve.in_time[detector.chosen])
+    return float(curve.rate[detector.chosen]), float(curve.seen(0.0)[detector.chosen])
 
 
 @pytest.mark.parametrize(("rule", "finer"), [(LateralSpeed, -1.0), (WanderingZone, -1.0), (TimeToLine, 1.0)])
@@ -59,6 +59,19 @@ def test_the_threshold_is_the_least_sensitive_one_that_sees_the_share(rule, coar
     found = carried(read_goal("90%"), rule(), scored(rule(), views), "made")
     assert at(rule(threshold=found.threshold), views)[1] == found.home.seen >= 0.9
     assert at(rule(threshold=found.threshold * (1.0 + 0.01 * coarser)), views)[1] < 0.9
+
+
+def test_a_goal_may_ask_for_time_before_the_marking():
+    views = traffic(20)
+    for rule in (LateralSpeed(), TimeToLine()):
+        found = carried(read_goal("80% 0.5s"), rule, scored(rule, views), "made")
+        tally = Tally(type(rule)(threshold=found.threshold), "made")
+        for each in views:
+            tally.add(*each)
+        early = [lead[tally.detector.chosen] > 0.5 for lead in tally.leads]
+        assert found.home.met and len(early) == 20 and np.mean(early) >= 0.8 > np.mean(early) - 0.1
+    never = carried(read_goal("95% 30s"), LateralSpeed(), scored(LateralSpeed(), views), "made").home
+    assert not never.met and never.why_not.endswith("seen at most")
 
 
 class Memory(LateralSpeed):
@@ -158,12 +171,14 @@ def test_the_same_source_as_home_and_tried_is_set_on_other_vehicles(folder):
     ("words", "what"),
     [
         ("--tune 20/h", "--tune and --home belong together"),
-        ("--tune 20/h --home home --train home --detector logistic", "--train names a home"),
         ("--tune 20/h --home home --home home", "two homes are called 'home'"),
         ("--home home", "--tune and --home belong together"),
         ("--tune 20 --home home", "'20': expected false alarms an hour as in 20/h"),
         ("--tune 0/h --home home", "'0/h'"),
         ("--tune 101% --home home", "'101%'"),
+        ("--tune 20/h1s --home home", "'20/h1s'"),
+        ("--threshold 0.3", "--threshold is gone: a program's score above 0.5 is an alarm"),
+        ("--answer-time 3", "--answer-time is gone: a program has 10 s"),
     ],
 )
 def test_what_can_t_be_meant_is_one_line(words, what, folder, capsys):

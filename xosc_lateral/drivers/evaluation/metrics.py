@@ -143,11 +143,6 @@ def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
     return Distances(dict(zip(METRICS, column_distances(real, other), strict=True)))
 
 
-def snippet_distances(real: FloatArray, other: FloatArray) -> Distances:
-    """Distance of two sets of snippets, shape (n, length) and (m, length), in deviations of the real ones. [-]"""
-    return metric_distances(snippet_metrics(real), snippet_metrics(other))
-
-
 def mean_distances(several: list[Distances]) -> Distances:
     """Average over repeated splits."""
     return Distances({name: float(np.mean([one.by_metric[name] for one in several])) for name in METRICS})

@@ -6,16 +6,21 @@ nervous or too calm for the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.evaluation.spectra import SEGMENTS, Spectrum, spectrum
-from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, truth_of
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene, truth_of
+
+if TYPE_CHECKING:
+    from xosc_lateral.extras.detect.observation import Sensor
 
 ROWS = round(0.2 / STEP)
 """Rows to one of the spectrum's, whose windows are made for 5 Hz. [rows]"""
@@ -72,3 +77,26 @@ def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
     return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
+
+
+def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
+    """The sensor with the band that a recording leaves of what moves in these scenes."""
+    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
+    return replace(sensor, band=band_of(recorded, home))
+
+
+SEEN = "seen_through"
+"""Key of a profile's record: at which frequencies [Hz] its recording shows which share of the amplitude. [-]"""
+
+
+def band_in(profile: DriverProfile) -> Band:
+    """The band of a profile's recording, from its record; raises `DriverProfileError` where that holds none."""
+    seen: Any = profile.provenance.fit.get(SEEN)
+    try:
+        frequency, gain = (np.array(seen[name], dtype=np.float64) for name in ("frequency_hz", "gain"))
+        rising = frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and len(frequency) == len(gain)
+        if rising and ((gain >= 0.0) & (gain <= 1.0)).all():
+            return Band(frequency, gain)
+    except (IndexError, KeyError, TypeError, ValueError):  # anybody may write there what they like
+        pass
+    raise DriverProfileError(f"{profile.name} does not hold the band of its recording: name the recording")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import replace as replaced
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,19 +14,12 @@ from xosc_lateral.workflows.options import paths as as_paths
 from xosc_lateral.workflows.result import given_profile
 
 if TYPE_CHECKING:
-    from xosc_lateral.drivers.evaluation.spectra import Spectrum
     from xosc_lateral.extras.detect.cut_ins import CutIns
     from xosc_lateral.extras.detect.detection import Detection
-    from xosc_lateral.extras.detect.detectors import Detector
-    from xosc_lateral.extras.detect.observation import Sensor, View
+    from xosc_lateral.extras.detect.observation import Sensor
+    from xosc_lateral.extras.detect.scoring import Tally
     from xosc_lateral.extras.detect.sight import Sight
-    from xosc_lateral.extras.detect.sources import SourceSettings
-    from xosc_lateral.extras.detect.tracks import Scene
-    from xosc_lateral.extras.detect.tuning import Learner
     from xosc_lateral.files.mapping import MappingLike
-
-ALL_RULES = "all"
-TRAINED_RULE = "logistic"
 
 
 def _known_sensor(text: str) -> str:
@@ -43,27 +35,24 @@ def detect(
     detectors: Annotated[str | Sequence[str], flag("--detector", kind=list[str] | None,
         metavar='NAME[:OPTION=VALUE,...]|"COMMAND"',
         help="lateral-speed (threshold, hold), marking-distance, wandering-zone, time-to-line, fuzzy, logistic "
-        "(threshold each), all, or a program of yours; may be repeated. Default: all.")] = (ALL_RULES,),
+        "(threshold each), a program of yours, or all that need no training (all, the default); may be "
+        "repeated.")] = ("all",),
     ego: Annotated[str | None, flag(metavar="NAME",
         help="Count cut-ins into its lane; none: into any neighbouring lane.")] = None,
     variants: Annotated[int, flag(help="Lifelike variants of each scenario, beside it.", min=0, max=10_000)] = 0,
     profiles: Annotated[str | Sequence[str], flag("--profile", "-p", kind=list[str] | None, metavar="NAME|PATH",
         help="Who drives the variants; may be repeated.")] = ("motorway",),
-    train: Annotated[Paths, flag(kind=list[Path] | None, metavar="SOURCE",
-        help="What logistic is trained on; may be repeated.")] = (),
     sensor: Annotated[str | Sensor, flag(kind=str, read=_known_sensor, metavar="noise=M,delay=S,rate=HZ",
         help="What detectors see through; usual: 0.05, 0.1, 20.")] = "",
-    tune: Annotated[str, flag(metavar="N/h|N%",
-        help="Set thresholds on the homes: at most so many false alarms an hour (20/h), or so many cut-ins seen before "
-        "the marking (95%).")] = "",
     home: Annotated[Paths, flag(kind=list[Path] | None, metavar="SOURCE",
-        help="With --tune: what thresholds are set on, and logistic is trained on; each for itself; may be "
+        help="What logistic is trained on; with --tune each for itself, and thresholds are set there; may be "
         "repeated.")] = (),
-    band_of: Annotated[PathLike | None, flag("--band-of", kind=Path | None, metavar="RECORDING", show_default=False,
-        help="With --tune: see the homes through the band of a recording, which shows less of fast "
-        "movement.")] = None,
-    threshold: Annotated[float, flag(help="Score above which a program's answer is an alarm.")] = 0.5,
-    answer_time: Annotated[float, flag(help="A program has to answer within [s].", min=0.01, max=3600)] = 10.0,
+    tune: Annotated[str, flag(metavar="N/h|N%|N% Ns",
+        help="Set thresholds on the homes: at most so many false alarms an hour (20/h), or so many cut-ins seen before "
+        "the marking (95%), or so long before it (90% 1s).")] = "",
+    band_of: Annotated[ProfileLike | None, flag("--band-of", kind=str | None, metavar="RECORDING|PROFILE",
+        show_default=False, help="With --tune: see the homes through the band of a recording, or of that of a profile, "
+        "which shows less of fast movement.")] = None,
     like: Annotated[ProfileLike | None, flag(kind=str | None, metavar="PROFILE", show_default=False,
         help="A table of cut-ins instead: the scenario's lane changes varied as by `vary --like`, a drive for each "
         "set.")] = None,
@@ -98,9 +87,9 @@ def detect(
     variants : int
         Lifelike variants of each scenario, with each of the profiles, counted beside the scenario as it is.
     tune : str
-        "20/h", "95%": each home (with variants: as written, and lifelike) gives each detector a threshold, which is
-        tried on the sources. What is trained at home is set there on vehicles that it was not trained on. A source
-        that is a home too is tried with thresholds from its other vehicles.
+        "20/h", "95%", "90% 1s": each home (with variants: as written, and lifelike) gives each detector a threshold,
+        which is tried on the sources. What is trained at home is set there on vehicles that it was not trained on. A
+        source that is a home too is tried with thresholds from its other vehicles.
     road : str or Path, optional
         OpenDRIVE file of a recording or table of states that comes without one, or in place of a scenario's.
 
@@ -113,15 +102,18 @@ def detect(
     ValueError
         A detector, option or sensor that does not exist.
     """
-    from xosc_lateral.extras.detect.detection import Detection
-    from xosc_lateral.extras.detect.detectors import Detector
-    from xosc_lateral.extras.detect.observation import read_sensor, views_of
-    from xosc_lateral.extras.detect.scoring import Tally
+    from dataclasses import replace as replaced
+
+    from xosc_lateral.extras.detect.band import band_in, keeping_spectrum
+    from xosc_lateral.extras.detect.cut_ins import cut_ins_like
+    from xosc_lateral.extras.detect.detection import Detection, count_all
+    from xosc_lateral.extras.detect.logistic import TRAINED_RULE, read_detectors, train_all
+    from xosc_lateral.extras.detect.observation import read_sensor
     from xosc_lateral.extras.detect.sight import sight_of
     from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
-    from xosc_lateral.extras.detect.tracks import moves_in_lane
-    from xosc_lateral.extras.detect.tuning import in_order, read_goal, set_at_home
+    from xosc_lateral.extras.detect.tuning import read_goal, tune_all
     from xosc_lateral.files.mapping import as_mapping
+    from xosc_lateral.workflows.batch.call import read_shard
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
     inputs = [
@@ -133,157 +125,49 @@ def detect(
         for number, one in enumerate(several(sources), start=1)
         for path in (opened(one, f"table {number}") if not is_document(one) else [Path()])
     ]
-    paths, homes, trainers = [one.path for one in inputs], as_paths(home), as_paths(train)
+    paths, home_paths, goal = [one.path for one in inputs], as_paths(home), read_goal(tune) if tune else None
+    requested = [detectors] if isinstance(detectors, str) else list(detectors)
+    chosen = [each for word in requested for each in read_detectors(word)]
+    is_trained = any(word.partition(":")[0] == TRAINED_RULE for word in requested)
     if not paths:
         raise ValueError("no source to look at")
-    if bool(tune) != bool(homes):
+    if is_trained and not home_paths:
+        raise ValueError(f"{TRAINED_RULE} has to be trained: name a source with --home")
+    if bool(home_paths) != (goal is not None or is_trained):
         raise ValueError("--tune and --home belong together: to what thresholds are set, and where")
-    if {*map(Path.resolve, trainers)} & {*map(Path.resolve, homes)}:
-        raise ValueError("--train names a home: without it, logistic is trained there and set on other vehicles")
-    if band_of is not None and not homes:
+    if band_of is not None and goal is None:
         raise ValueError("--band-of is what homes are seen through: name them with --home, and --tune")
-    goal = read_goal(tune) if tune else None
-    seen_with = read_sensor(sensor) if isinstance(sensor, str) else sensor
-    requested = [detectors] if isinstance(detectors, str) else list(detectors)
-    names = (profiles,) if isinstance(profiles, str) else tuple(profiles)
-    for word in requested:  # before anything is read that takes long
-        _read_detector(word, threshold, answer_time)
+    if like is not None and (len(paths) != 1 or inputs[0].held is not None):
+        raise ValueError("--like varies one scenario, in a file")
     convert = ConvertSettings.of(seed=seed, library=library, allow=allow, road_path=road_path, time_limit=time_limit)
-    settings = SourceSettings(convert, variants, names, ego, columns=as_mapping(columns))
+    settings = SourceSettings(
+        convert, variants, (profiles,) if isinstance(profiles, str) else tuple(profiles), ego,
+        columns=as_mapping(columns), sensor=read_sensor(sensor) if isinstance(sensor, str) else sensor,
+    )  # fmt: skip
     if isinstance(road, str | os.PathLike):
         settings = settings.on(Path(road))
-    if like is not None:
-        from xosc_lateral.extras.detect.cut_ins import cut_ins_like
-        from xosc_lateral.workflows.batch.call import read_shard
-
-        if len(paths) != 1 or inputs[0].held is not None:
-            raise ValueError("--like varies one scenario, in a file")
-        detections = [
-            each
-            for word in requested
-            for each in _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=False)
-            if isinstance(each, Detector)
-        ]
-        part = (1, 1) if shard is None else read_shard(shard)
-        where = None if keep is None else Path(keep)
-        law = given_profile(like, library)
-        return cut_ins_like(
-            paths[0], law, detections, settings, seen_with, count=count, replaces=replace, part=part, keep=where
-        )
+    as_they_are = replaced(settings, variants=0)
     looked_at = [source for one in inputs for source in sources_of(one.path, settings.on(one.road, one.held))]
-    bands = () if band_of is None else (Path(band_of),)
-    files = [path for path in (*paths, *trainers, *homes, *bands) if path.is_file()]
+    bands = [Path(one) for one in (band_of,) if isinstance(one, str | Path)]
+    bands = [one for one in bands if one.is_dir() or one.suffix not in ("", ".json")]  # others are profiles
+    files = [path for path in (*paths, *home_paths, *bands) if path.is_file()]
     if sight:
         return sight_of(looked_at, seed, files)
-    known_homes = [source for path in homes for source in sources_of(path, settings)]
-    labels = [source.label for source in known_homes]
-    if twice := sorted({label for label in labels if labels.count(label) > 1}):
-        raise ValueError(f"two homes are called {twice[0]!r}, which rows could not tell apart")
-    chosen: list[Detector | Learner] = []
-    for word in requested:
-        chosen += _detectors(word, threshold, answer_time, trainers, settings, seen_with, seed, at_home=bool(homes))
-    tried = [each for each in chosen if isinstance(each, Detector)]
-    needs_others = any(detector.needs_observer for detector in tried)
-    tallies_at_home = dict[str, list[Tally]]()
-    if goal is not None:
-        tried = []
-        recorded = [band_source(path, settings) for path in bands]
-        for source in known_homes:
-            scenes = list(checked(source))
-            at_home = seen_through(recorded[0], scenes, seen_with) if recorded else seen_with
-            views = [(scene, views_of(scene, at_home, seed, with_observers=needs_others)) for scene in scenes]
-            within = any(source.is_same(each) for each in looked_at)
-            for candidate in chosen:
-                carrier, tally = set_at_home(goal, candidate, views, source.label, within=within)
-                tried.append(carrier)
-                tallies_at_home.setdefault(source.label, []).extend([] if tally is None else [tally])
-    tallies, still = list[Tally](), set[str]()
-    for source in looked_at:
-        itself = tallies_at_home.get(source.label, []) if any(source.is_same(each) for each in known_homes) else []
-        elsewhere = [each for each in tried if not (itself and each.home_source == source.label)]
-        source_tallies = [Tally(detector, source.label) for detector in elsewhere]
-        moves = False
-        for scene in checked(source):
-            views_here = views_of(scene, seen_with, seed, with_observers=needs_others)
-            moves = moves or any(moves_in_lane(view.track, view.truth) for view in views_here)
-            for tally in source_tallies:
-                tally.add(scene, views_here)
-        tallies += in_order([*source_tallies, *itself], labels)
-        still |= set() if moves else {source.label}
-    return Detection(tallies, looked_at, seen_with, seed, frozenset(still), files, goal, known_homes)
-
-
-def band_source(path: Path, settings: SourceSettings) -> Spectrum:
-    """Spectrum of lane keeping of a recording."""
-    from xosc_lateral.extras.detect.band import keeping_spectrum
-    from xosc_lateral.extras.detect.sources import checked, sources_of
-
-    (source,) = sources_of(path, replaced(settings, variants=0))
-    return keeping_spectrum((track for scene in checked(source) for track in scene.tracks), source.label)
-
-
-def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
-    """The sensor with the band that a recording leaves of what moves in these scenes."""
-    from xosc_lateral.extras.detect.band import band_of, keeping_spectrum
-
-    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
-    return replaced(sensor, band=band_of(recorded, home))
-
-
-def _read_detector(word: str, threshold: float, answer_time: float) -> Detector | float | None:
-    """A rule or command; the threshold of one that is still to be trained; None: all of them."""
-    from xosc_lateral.extras.detect.command import Command
-    from xosc_lateral.extras.detect.detectors import read_rule
-    from xosc_lateral.extras.detect.observation import read_numbers
-
-    name, _, options = word.partition(":")
-    if word == ALL_RULES:
-        return None
-    if name == TRAINED_RULE:
-        return read_numbers(options, {"threshold": (1e-6, 1.0 - 1e-6)}, TRAINED_RULE).get("threshold", 0.5)
-    return read_rule(word) or Command(word, threshold, answer_time)
-
-
-def _detectors(
-    word: str,
-    threshold: float,
-    answer_time: float,
-    trainers: Sequence[Path],
-    settings: SourceSettings,
-    sensor: Sensor,
-    seed: int,
-    *,
-    at_home: bool,
-) -> Iterator[Detector | Learner]:
-    """Detectors of a word; what is still to be trained at home, as its learner."""
-    from xosc_lateral.extras.detect.detectors import RULES, Detector
-    from xosc_lateral.extras.detect.logistic import train
-
-    detector = _read_detector(word, threshold, answer_time)
-    if isinstance(detector, Detector):
-        yield detector
-        return
-    if detector is None:
-        yield from (rule() for rule in RULES.values())
-        if not trainers:
-            return
-        detector = 0.5
-    set_first = detector
-    if not trainers and at_home:
-        yield lambda views, source: train(views, set_first, source)
-        return
-    if not trainers:
-        raise ValueError(f"{TRAINED_RULE} has to be trained: name a source with --train")
-    as_they_are = replaced(settings, variants=0)
-    views = _training_views(trainers, as_they_are, sensor, seed)
-    yield train(views, detector, ", ".join(path.name for path in trainers))
-
-
-def _training_views(trainers: Sequence[Path], settings: SourceSettings, sensor: Sensor, seed: int) -> Iterator[View]:
-    from xosc_lateral.extras.detect.observation import views_of
-    from xosc_lateral.extras.detect.sources import checked, sources_of
-
-    for path in trainers:
-        for source in sources_of(path, settings):
-            for scene in checked(source):
-                yield from views_of(scene, sensor, seed, with_observers=False)
+    homes = [one for path in home_paths for one in sources_of(path, as_they_are if goal is None else settings)]
+    done_there: dict[str, list[Tally]] = {}
+    if goal is None:
+        tried = train_all(chosen, homes, settings)
+    else:
+        at_home, recorded = settings, None
+        if band_of is not None and not bands:
+            through = band_in(given_profile(band_of, library))
+            at_home = replaced(settings, sensor=replaced(settings.sensor, band=through))
+        for source in [one for path in bands for one in sources_of(path, as_they_are)]:
+            recorded = keeping_spectrum((one for scene in checked(source) for one in scene.tracks), source.label)
+        tried, done_there = tune_all(goal, chosen, homes, looked_at, at_home, recorded)
+    if like is not None:
+        part, law = (1, 1) if shard is None else read_shard(shard), given_profile(like, library)
+        where = None if keep is None else Path(keep)
+        return cut_ins_like(paths[0], law, tried, settings, count=count, replaces=replace, part=part, keep=where)
+    tallies, still = count_all(tried, looked_at, done_there, homes, settings)
+    return Detection(tallies, looked_at, settings.sensor, seed, still, files, goal, homes if goal else ())

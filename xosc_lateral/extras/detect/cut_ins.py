@@ -15,8 +15,8 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
-from xosc_lateral.extras.detect.observation import Sensor, View, views_of
-from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of
+from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of, plain
 from xosc_lateral.extras.detect.sources import SourceSettings, converted, played_scene
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
 from xosc_lateral.extras.detect.vary import Variations, vary
@@ -36,7 +36,7 @@ DETECTOR_HEADINGS = ("detector", "seen", "before the marking", "time before it [
 
 
 def cut_ins_like(
-    scenario: Path, law: DriverProfile, detectors: Sequence[Detector], settings: SourceSettings, sensor: Sensor, *,
+    scenario: Path, law: DriverProfile, detectors: Sequence[Detector], settings: SourceSettings, *,
     count: int, replaces: bool = False, part: tuple[int, int] = (1, 1), keep: Path | None = None,
 ) -> CutIns:  # fmt: skip
     """Vary a scenario's lane changes by a profile's law, convert each set, and run detectors on what is written.
@@ -68,7 +68,7 @@ def cut_ins_like(
             scene = played_scene(
                 played, f"{scenario.stem}{suffix}", ego or next(iter(conversion.provenance.ego), "none")
             )
-            views = views_of(scene, sensor, seed)
+            views = settings.views(scene)
             tallies = [Tally(detector, scene.name) for detector in detectors]
             for tally in tallies:
                 tally.add(scene, views)
@@ -160,9 +160,8 @@ class CutIns(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        rows = [{name: None if value != value else value for name, value in row.items()} for row in self.rows]
         return {"scenario": str(self.scenario), "profile": self.profile, "variations": self.variations.to_dict(),
-                "rows": rows, "provenance": self.provenance()}  # fmt: skip
+                "rows": plain(list(self.rows)), "provenance": self.provenance()}  # fmt: skip
 
     def provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""

@@ -15,8 +15,9 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
-from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, worst_of
-from xosc_lateral.extras.detect.sources import Source
+from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, plain, worst_of
+from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
+from xosc_lateral.extras.detect.tracks import moves_in_lane
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
@@ -154,17 +155,17 @@ class Detection(Result):
                 "goal": self.goal.text,
                 "homes": [{"label": one.label, "files": [path.name for path in one.files]} for one in self.homes],
             }),
-            "rows": [_plain(row) for row in self.rows()], "messages": self.message_records(),
+            "rows": plain(self.rows()), "messages": self.message_records(),
             "curves": [
                 {
                     "source": curve.source,
                     "detector": curve.detector.label(),
                     "quantity": curve.detector.quantity,
                     "threshold": curve.detector.thresholds.tolist(),
-                    "false_alarms_per_hour": _listed(curve.rate),
-                    "seen": _listed(curve.seen),
-                    "seen_before_marking": _listed(curve.in_time),
-                    "median_lead_s": _listed(curve.lead(0.5)),
+                    "false_alarms_per_hour": plain(curve.rate.tolist()),
+                    "seen": plain(curve.seen().tolist()),
+                    "seen_before_marking": plain(curve.seen(0.0).tolist()),
+                    "median_lead_s": plain(curve.lead(0.5).tolist()),
                 }
                 for curve in self.curves
             ],
@@ -207,9 +208,41 @@ class Detection(Result):
         return write_page(path, "detection.html", html, inputs=self.files, force=force)
 
 
+def count_all(
+    tried: Sequence[Detector],
+    sources: Sequence[Source],
+    at_home: Mapping[str, Sequence[Tally]],
+    homes: Sequence[Source],
+    settings: SourceSettings,
+) -> tuple[list[Tally], frozenset[str]]:
+    """What detectors do on each source, by detector, then by home; and sources in which nobody moves inside a lane.
+
+    `at_home`: what those of a home do on it themselves, on vehicles that had no part in their thresholds.
+    """
+    tallies, still = list[Tally](), set[str]()
+    order = ["", *(source.label for source in homes)]
+    titles = list(dict.fromkeys(detector.title() for detector in tried))
+    with_observers = any(detector.needs_observer for detector in tried)
+    for source in sources:
+        itself = at_home.get(source.label, ()) if any(map(source.is_same, homes)) else ()
+        mine = [Tally(one, source.label) for one in tried if not (itself and one.home_source == source.label)]
+        still.add(source.label)
+        for scene in checked(source):
+            views = settings.views(scene, with_observers=with_observers)
+            if any(moves_in_lane(view.track, view.truth) for view in views):
+                still.discard(source.label)
+            for tally in mine:
+                tally.add(scene, views)
+        tallies += sorted(
+            [*mine, *itself],
+            key=lambda one: (titles.index(one.detector.title()), order.index(one.detector.home_source)),
+        )
+    return tallies, frozenset(still)
+
+
 def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
     detector, rates, seen = curve.detector, curve.rate_interval(), curve.seen_interval()
-    in_time, medians = curve.seen_interval(in_time=True), curve.lead_interval()
+    in_time, medians = curve.seen_interval(0.0), curve.lead_interval()
     low, middle, high = (curve.lead(share) for share in (0.05, 0.5, 0.95))
     fixed: dict[str, Any] = {"source": curve.source, "detector": detector.label()}
     if isinstance(detector, Carried):
@@ -227,8 +260,8 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
             "false_alarms": int(curve.counts[:, k].sum()),
             "false_alarms_per_hour": float(curve.rate[k]),
             "false_alarms_low": float(rates[0, k]), "false_alarms_high": float(rates[1, k]),
-            "seen": float(curve.seen[k]), "seen_low": float(seen[0, k]), "seen_high": float(seen[1, k]),
-            "seen_before_marking": float(curve.in_time[k]),
+            "seen": float(curve.seen()[k]), "seen_low": float(seen[0, k]), "seen_high": float(seen[1, k]),
+            "seen_before_marking": float(curve.seen(0.0)[k]),
             "seen_before_marking_low": float(in_time[0, k]), "seen_before_marking_high": float(in_time[1, k]),
             "lead_median": float(middle[k]), "lead_5": float(low[k]), "lead_95": float(high[k]),
             "lead_median_low": medians[0] if is_set else np.nan,
@@ -242,18 +275,6 @@ def _rows(curve: Curve, numbers: Sequence[int]) -> list[dict[str, Any]]:
 def is_met(detector: Detector) -> bool:
     """Whether its threshold is its own, or from a home that could set it."""
     return not isinstance(detector, Carried) or detector.home.met
-
-
-def _listed(values: Any) -> list[float | None]:
-    return [None if np.isnan(value) else round(float(value), 6) for value in values]
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN as None, numbers rounded."""
-    return {
-        name: (None if np.isnan(value) else round(value, 6)) if isinstance(value, float) else value
-        for name, value in row.items()
-    }
 
 
 # ---- cells of the table ----

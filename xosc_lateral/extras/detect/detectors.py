@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import ClassVar, TypeAlias
 
@@ -72,6 +72,10 @@ class Detector(ABC):
     def usable(self, views: Sequence[View]) -> Sequence[View]:
         """Views that it can score."""
         return [view for view in views if view.observer is not None] if self.needs_observer else views
+
+
+Learner: TypeAlias = Callable[[Iterable[View], str], Detector]
+"""Trains a detector on views of a source, which it may name in errors."""
 
 
 @dataclass(frozen=True)

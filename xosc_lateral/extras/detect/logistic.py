@@ -9,10 +9,14 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.extras.detect.detectors import Detector
-from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.command import Command
+from xosc_lateral.extras.detect.detectors import RULES, Detector, Learner, read_rule
+from xosc_lateral.extras.detect.observation import View, read_numbers
 from xosc_lateral.extras.detect.scoring import cut_ins_of
+from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import STEP, Scene
+
+ALL_RULES, TRAINED_RULE = "all", "logistic"
 
 FEATURES = ("position", "lateral speed", "lateral acceleration", "mean lateral speed", "movement", "unrest")
 """Now; over the last second: the mean lateral speed, and the means of the amounts of speed and acceleration."""
@@ -80,7 +84,7 @@ def fit_regression(columns: FloatArray, positive: BoolArray) -> Regression:
 class Logistic(Detector):
     """Above a probability of a cut-in, as trained on views of a source: `NAME` says of which."""
 
-    name = "logistic"
+    name = TRAINED_RULE
     quantity = "probability [-]"
     CURVE = np.round([0.01, 0.02, 0.05, *np.arange(0.1, 0.91, 0.05), 0.95, 0.98, 0.99, 0.995, 0.999, 0.9999], 4)
 
@@ -138,3 +142,26 @@ def train(views: Iterable[View], threshold: float, source: str) -> Logistic:
         amounts = f"{cut_ins:.1f} s of cut-ins and {keeping:.1f} s of lane keeping"
         raise NotEnoughDataError(f"{source}: {amounts}, training needs 1 s of each")
     return Logistic(fit_regression(columns, positive), threshold)
+
+
+# ---- detectors by their words ----
+def read_detectors(word: str) -> Sequence[Detector | Learner]:
+    """Rules, a command, or who trains a detector."""
+    name, _, options = word.partition(":")
+    if word == ALL_RULES:
+        return [rule() for rule in RULES.values()]
+    if name != TRAINED_RULE:
+        return [read_rule(word) or Command(word)]
+    threshold = read_numbers(options, {"threshold": (1e-6, 1.0 - 1e-6)}, name).get("threshold", 0.5)
+    return [lambda views, source: train(views, threshold, source)]
+
+
+def train_all(
+    chosen: Sequence[Detector | Learner], homes: Sequence[Source], settings: SourceSettings
+) -> list[Detector]:
+    """Detectors; what has to be trained is, on all homes together."""
+    views = [
+        view for source in homes for scene in checked(source) for view in settings.views(scene, with_observers=False)
+    ]
+    names = ", ".join(source.label for source in homes)
+    return [one if isinstance(one, Detector) else one(views, names) for one in chosen]

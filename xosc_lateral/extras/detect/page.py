@@ -89,7 +89,7 @@ def finding(curves: Sequence[Curve]) -> str:
     rates = [f"{_alarms(most)} on {most.source}"]
     if most is not fewest:
         rates.append(f"{_alarms(fewest)} on {fewest.source}")
-    shares = [100.0 * float(curve.in_time[curve.detector.chosen]) for curve in curves if len(curve.leads)]
+    shares = [100.0 * float(curve.seen(0.0)[curve.detector.chosen]) for curve in curves if len(curve.leads)]
     cut_ins = sum(len(curve.leads) for curve in curves)
     low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))
     seen = f"{low} %" if low == high else f"{low} to {high} %, by source,"
@@ -133,7 +133,7 @@ def curves_figure(curves: Sequence[Curve]) -> Figure:
             if curve.detector.label() == name and len(curve.leads) and len(curve.hours):
                 color, chosen = color_of(sources.index(curve.source)), curve.detector.chosen
                 rate = np.maximum(curve.sensitive_rate(), LEAST_RATE)
-                for panel, values in ((left, 100.0 * curve.in_time), (right, curve.lead(0.5))):
+                for panel, values in ((left, 100.0 * curve.seen(0.0)), (right, curve.lead(0.5))):
                     panel.line(rate, values, color, label=curve.source)
                     panel.dots(rate[[chosen]], values[[chosen]], color)
     return figure

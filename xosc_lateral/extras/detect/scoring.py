@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -176,15 +177,12 @@ class Curve:
         total = float(self.hours.sum())
         return self.counts.sum(axis=0) / total if total > 0.0 else np.full(self.counts.shape[1], np.nan)
 
-    @property
-    def seen(self) -> FloatArray:
-        """Share of cut-ins that were seen, shape (m,); NaN: there are none."""
-        return np.isfinite(self.leads).mean(axis=0) if len(self.leads) else np.full(self.leads.shape[1], np.nan)
+    def seen(self, lead: float = -np.inf) -> FloatArray:
+        """Share of cut-ins seen more than so long before the marking was crossed [s], shape (m,); NaN: none is there.
 
-    @property
-    def in_time(self) -> FloatArray:
-        """Share of cut-ins that were seen before the marking was crossed, shape (m,); NaN: there are none."""
-        return (self.leads > 0.0).mean(axis=0) if len(self.leads) else np.full(self.leads.shape[1], np.nan)
+        With 0 before it, without a time at all.
+        """
+        return (self.leads > lead).mean(axis=0) if len(self.leads) else np.full(self.leads.shape[1], np.nan)
 
     def lead(self, share: float) -> FloatArray:
         """Quantile of the time before the marking, of cut-ins that were seen, shape (m,). [s]"""
@@ -211,13 +209,13 @@ class Curve:
         interval[:, none] = np.array([[0.0], [NO_ALARM_BOUND / total if total > 0.0 else np.nan]])
         return interval
 
-    def seen_interval(self, *, in_time: bool = False) -> FloatArray:
-        """95 % interval of `seen` or `in_time`, shape (2, m); NaN: cut-ins of one vehicle alone, or none."""
+    def seen_interval(self, lead: float = -np.inf) -> FloatArray:
+        """95 % interval of `seen`, shape (2, m); NaN: cut-ins of one vehicle alone, or none."""
         if len(set(self.cluster.tolist())) < 2:
             return np.full((2, self.leads.shape[1]), np.nan)
         drawn = self.weights[:, self.cluster].astype(np.float64)
         count = drawn.sum(axis=1)
-        shares = (drawn @ (self.leads > (0.0 if in_time else -np.inf))) / np.where(count > 0.0, count, np.nan)[:, None]
+        shares = (drawn @ (self.leads > lead)) / np.where(count > 0.0, count, np.nan)[:, None]
         return np.asarray(np.nanquantile(shares, INTERVAL_SHARES, axis=0))
 
     def lead_interval(self) -> tuple[float, float]:
@@ -244,11 +242,20 @@ class Curve:
         fine = np.flatnonzero(self.sensitive_rate() <= rate)
         return int(fine[0]) if len(fine) else len(self.rate) - 1
 
-    def seeing(self, share: float) -> int:
-        """Number of the least sensitive threshold at which such a share of cut-ins is seen before the marking."""
-        enough = np.flatnonzero(self.in_time >= share)
+    def seeing(self, share: float, lead: float) -> int:
+        """Number of the least sensitive threshold at which such a share of cut-ins is seen so long before. [s]"""
+        enough = np.flatnonzero(self.seen(lead) >= share)
         return int(enough[-1]) if len(enough) else 0
 
 
 def _quantile(values: FloatArray, share: float) -> float:
     return float(np.quantile(values, share)) if len(values) else np.nan
+
+
+def plain(values: Any) -> Any:
+    """Lists, dictionaries and numbers for JSON: rounded to a millionth, in their units, and none that is NaN."""
+    if isinstance(values, dict):
+        return {name: plain(value) for name, value in values.items()}
+    if isinstance(values, list):
+        return [plain(value) for value in values]
+    return (None if np.isnan(values) else round(values, 6)) if isinstance(values, float) else values

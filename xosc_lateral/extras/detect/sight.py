@@ -15,7 +15,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
-from xosc_lateral.extras.detect.scoring import INTERVAL_SHARES, RESAMPLES
+from xosc_lateral.extras.detect.scoring import INTERVAL_SHARES, RESAMPLES, plain
 from xosc_lateral.extras.detect.sources import Source, checked
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Rows, Scene
 from xosc_lateral.extras.detect.visibility import Boxes, points_seen, visible_share
@@ -176,12 +176,8 @@ class Sight(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        rows = [
-            {name: _plain(value) if isinstance(value, float) else value for name, value in row.items()}
-            for row in self.rows()
-        ]
         sources = [{"label": one.label, "files": [path.name for path in one.files]} for one in self.origins]
-        return {"sources": sources, "sight": rows, "bands": self.bands(), "provenance": self.provenance()}
+        return {"sources": sources, "sight": plain(self.rows()), "bands": self.bands(), "provenance": self.provenance()}
 
     def provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
@@ -253,10 +249,6 @@ def _summary(moments: Sequence[SightMoment]) -> dict[str, Any]:
         "lane_seen": np.nan if nothing else float(np.median([one.lane for one in moments])),
         "gap": np.nan if nothing else float(np.median([one.gap for one in moments])),
     }  # fmt: skip
-
-
-def _plain(value: float) -> float | None:
-    return None if np.isnan(value) else round(value, 6)
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, views_of
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene, in_lanes, tracks_of
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
@@ -65,10 +66,15 @@ class SourceSettings:
     road: Path | None = None
     columns: TableMapping = field(default_factory=lambda: as_mapping(None))
     held: Held | None = None  # a scenario in memory
+    sensor: Sensor = PERFECT_SENSOR  # through which detectors see
 
     def on(self, road: Path | None, held: Held | None = None) -> SourceSettings:
         """The same, with a road that counts whatever a scenario says."""
         return replace(self, convert=replace(self.convert, road=road), road=road, held=held)
+
+    def views(self, scene: Scene, *, with_observers: bool = True) -> list[View]:
+        """What detectors see of a scene."""
+        return views_of(scene, self.sensor, self.convert.seed, with_observers=with_observers)
 
 
 def sources_of(path: Path, settings: SourceSettings) -> list[Source]:

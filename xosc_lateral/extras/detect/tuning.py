@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -11,15 +11,16 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector
+from xosc_lateral.drivers.evaluation.spectra import Spectrum
+from xosc_lateral.extras.detect.band import seen_through
+from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector, Learner
 from xosc_lateral.extras.detect.observation import View
 from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
-from xosc_lateral.extras.detect.tracks import Scene
+from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
+from xosc_lateral.extras.detect.tracks import STEP, Scene
 
 Views: TypeAlias = Sequence[tuple[Scene, Sequence[View]]]
 """Scenes, each with what is seen in it."""
-Learner: TypeAlias = Callable[[Iterable[View], str], Detector]
-"""Trains a detector on views of a source, which it may name in errors."""
 
 FOLDS = 5
 """Of a home's vehicles: a trained detector scores those of one fold as trained on the others. The usual number, or that
@@ -35,14 +36,16 @@ class Goal:
 
     text: str
     rate: float | None = None  # [1/h]
-    share: float | None = None  # of cut-ins, before the marking
+    share: float | None = None  # of cut-ins
+    lead: float = 0.0  # before the marking, more than that [s]
 
     @property
     def what(self) -> str:
         """In words."""
         if self.rate is not None:
             return f"at most {self.rate:g} false alarms an hour"
-        return f"the fewest false alarms with {self.text} of the cut-ins seen before the marking"
+        early = f"{self.lead:g} s " if self.lead else ""
+        return f"the fewest false alarms with {self.share:.0%} of the cut-ins seen {early}before the marking"
 
     def number(self, curve: Curve) -> tuple[int, str]:
         """Of the threshold that meets it, and why none does it: empty where one does.
@@ -58,18 +61,21 @@ class Goal:
                 return k, ""
             return k, f"{rates[0]:.1f} an hour at any threshold" if rates[0] else "no alarm at any threshold"
         assert self.share is not None
-        k = curve.seeing(self.share)
-        seen = float(curve.in_time[k])
+        k = curve.seeing(self.share, self.lead)
+        seen = float(curve.seen(self.lead)[k])
         return k, "" if seen >= self.share else f"{seen:.0%} seen at most"
 
 
 def read_goal(text: str) -> Goal:
-    """A goal from ``20/h`` or ``95%``; raises `ValueError`."""
-    match = re.fullmatch(r"(\d+\.?\d*)\s*(/\s*h|%)", text.strip())
+    """A goal from ``20/h``, ``95%`` or ``90% 1s``; raises `ValueError`."""
+    match = re.fullmatch(r"(\d+\.?\d*)\s*(?:/\s*h|(%)(?:\s+(\d+\.?\d*)\s*s)?)", text.strip())
     value = float(match[1]) if match else 0.0
-    if match is None or value <= 0.0 or (match[2] == "%" and value > 100.0):
-        raise ValueError(f"{text!r}: expected false alarms an hour as in 20/h, or cut-ins seen as in 95%")
-    return Goal(text.strip(), share=0.01 * value) if match[2] == "%" else Goal(text.strip(), rate=value)
+    if match is None or value <= 0.0 or (match[2] and value > 100.0):
+        what = "cut-ins seen as in 95%, or in 90% 1s so long before the marking"
+        raise ValueError(f"{text!r}: expected false alarms an hour as in 20/h, or {what}")
+    if match[2]:
+        return Goal(text.strip(), share=0.01 * value, lead=float(match[3] or 0.0))
+    return Goal(text.strip(), rate=value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,28 +96,18 @@ class Home:
         return not self.why_not
 
 
-class Carried(Detector):
-    """A detector with a threshold from home."""
+class AtLimits(Detector):
+    """A detector at some limits alone, increasing."""
 
-    def __init__(self, detector: Detector, limit: float, home: Home) -> None:
-        self.detector, self.home = detector, home
+    def __init__(self, detector: Detector, limits: FloatArray, chosen: int = 0) -> None:
+        self.detector, self._limits, self._chosen = detector, limits, chosen
         self.needs_observer, self.growing = detector.needs_observer, detector.growing  # type: ignore[misc]
         self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
-        self.home_source = home.source
-        self.threshold = detector.threshold_of(limit)
-        known_limits = np.array([]) if home.is_source else detector.limits
-        self._limits = np.unique(np.append(known_limits, limit))
-        self._chosen = int(np.searchsorted(self._limits, limit))
 
     @property
     def limits(self) -> FloatArray:
         """See `Detector`."""
         return self._limits
-
-    @property
-    def thresholds(self) -> FloatArray:
-        """See `Detector`."""
-        return np.array([self.detector.threshold_of(limit) for limit in self._limits])
 
     @property
     def chosen(self) -> int:
@@ -122,6 +118,20 @@ class Carried(Detector):
         """See `Detector`."""
         return self.detector.scores(scene, views)
 
+
+class Carried(AtLimits):
+    """A detector with a threshold from home."""
+
+    def __init__(self, detector: Detector, limit: float, home: Home) -> None:
+        limits = np.unique(np.append(np.array([]) if home.is_source else detector.limits, limit))
+        super().__init__(detector, limits, int(np.searchsorted(limits, limit)))
+        self.threshold, self.home, self.home_source = detector.threshold_of(limit), home, home.source
+
+    @property
+    def thresholds(self) -> FloatArray:
+        """See `Detector`."""
+        return np.array([self.detector.threshold_of(limit) for limit in self._limits])
+
     def label(self) -> str:
         """See `Detector`."""
         return f"{self.detector.title()}, set on {self.home.source}"
@@ -129,28 +139,6 @@ class Carried(Detector):
     def title(self) -> str:
         """See `Detector`."""
         return self.detector.title()
-
-
-class AtLimits(Detector):
-    """A detector at some limits alone, increasing."""
-
-    def __init__(self, detector: Detector, limits: FloatArray) -> None:
-        self.detector, self._limits = detector, limits
-        self.name, self.quantity = detector.name, detector.quantity  # type: ignore[misc]
-
-    @property
-    def limits(self) -> FloatArray:
-        """See `Detector`."""
-        return self._limits
-
-    @property
-    def chosen(self) -> int:
-        """See `Detector`."""
-        return 0
-
-    def scores(self, scene: Scene, views: Sequence[View]) -> list[FloatArray]:
-        """See `Detector`."""
-        return self.detector.scores(scene, views)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,26 +160,38 @@ def scored(detector: Detector, views: Views) -> list[Scored]:
     return scored_views
 
 
-def set_at_home(
-    goal: Goal, detector: Detector | Learner, views: Views, source: str, *, within: bool = False
-) -> tuple[Carried, Tally | None]:
-    """The detector with its threshold from home; `within`: also what it does at home itself."""
-    if isinstance(detector, Detector):
-        trained, at_home = detector, scored(detector, views)
-    else:
-        trained, at_home = out_of_fold(detector, views, source)
-    within_source = carried_within(goal, trained, at_home, source) if within else None
-    return carried(goal, trained, at_home, source), within_source
+def tune_all(
+    goal: Goal,
+    chosen: Sequence[Detector | Learner],
+    homes: Sequence[Source],
+    tried_on: Sequence[Source],
+    settings: SourceSettings,
+    recorded: Spectrum | None = None,
+) -> tuple[list[Detector], dict[str, list[Tally]]]:
+    """Every detector with its threshold from each home; and by the home's label what each does there, if it is tried.
 
-
-def in_order(tallies: Sequence[Tally], homes: Sequence[str]) -> list[Tally]:
-    """By detector in the order in which it comes first, then by home."""
-    titles = list(dict.fromkeys(tally.detector.title() for tally in tallies))
-    order = ["", *homes]
-    return sorted(
-        tallies,
-        key=lambda each: (titles.index(each.detector.title()), order.index(each.detector.home_source)),
-    )
+    `recorded`: spectrum of lane keeping through whose band homes are seen. Raises `ValueError`: two homes of one label.
+    """
+    labels = [source.label for source in homes]
+    if twice := sorted({label for label in labels if labels.count(label) > 1}):
+        raise ValueError(f"two homes are called {twice[0]!r}, which rows could not tell apart")
+    found, at_home = list[Detector](), dict[str, list[Tally]]()
+    with_observers = any(isinstance(one, Detector) and one.needs_observer for one in chosen)
+    for source in homes:
+        scenes = list(checked(source))
+        seen = settings if recorded is None else replace(
+            settings, sensor=seen_through(recorded, scenes, settings.sensor)
+        )  # fmt: skip
+        views = [(scene, seen.views(scene, with_observers=with_observers)) for scene in scenes]
+        for one in chosen:
+            if isinstance(one, Detector):
+                trained, every = one, scored(one, views)
+            else:
+                trained, every = out_of_fold(one, views, source.label)
+            found.append(carried(goal, trained, every, source.label))
+            if any(map(source.is_same, tried_on)):
+                at_home.setdefault(source.label, []).append(carried_within(goal, trained, every, source.label))
+    return found, at_home
 
 
 def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, list[Scored]]:
@@ -226,62 +226,51 @@ def folds_of(views: Sequence[View], source: str, *, every_changes: bool) -> dict
     return {cluster: number % count for each in (changing, rest) for number, cluster in enumerate(each)}
 
 
-def carried(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Carried:
+def carried(
+    goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str, *, is_source: bool = False
+) -> Carried:
     """The detector with the threshold that meets the goal in these views."""
-    curve = _curve(detector, at_home, source)
+    tally = Tally(AtLimits(detector, _grid(detector, at_home, goal.lead)), source)
+    for each in at_home:
+        tally.count(each.scene, each.view, each.score)
+    curve = tally.curve()
     if not len(curve.hours) or not curve.hours.sum():
         raise NotEnoughDataError(f"{source}: no lane keeping that {detector.name} can be set on")
     if goal.share is not None and not len(curve.leads):
         raise NotEnoughDataError(f"{source}: no cut-in, so that no threshold sees {goal.text} of them")
     k, why_not = goal.number(curve)
-    home = Home(source, goal, why_not, float(curve.rate[k]), float(curve.in_time[k]), float(curve.hours.sum()))
-    return Carried(detector, float(curve.detector.limits[k]), home)
+    figures = float(curve.rate[k]), float(curve.seen(0.0)[k]), float(curve.hours.sum())
+    return Carried(detector, float(curve.detector.limits[k]), Home(source, goal, why_not, *figures, is_source))
 
 
 def carried_within(goal: Goal, detector: Detector, at_home: Sequence[Scored], source: str) -> Tally:
     """What the detector does at home itself: in each fold of vehicles with the threshold that the others give."""
     folds = folds_of([each.view for each in at_home], source, every_changes=goal.share is not None)
-    parts = []
+    whole = carried(goal, detector, at_home, source, is_source=True)
+    tally = Tally(whole, source)
     for fold in sorted(set(folds.values())):
         others = [each for each in at_home if folds[each.view.track.cluster] != fold]
-        carrier = carried(goal, detector, others, source)
-        tally = Tally(
-            Carried(detector, float(carrier.limits[carrier.chosen]), replace(carrier.home, is_source=True)), source
-        )
+        tally.detector = carried(goal, detector, others, source, is_source=True)
         for each in at_home:
             if folds[each.view.track.cluster] == fold:
                 tally.count(each.scene, each.view, each.score)
-        parts.append(tally)
-    every = carried(goal, detector, at_home, source)
-    whole = Tally(Carried(detector, float(every.limits[every.chosen]), replace(every.home, is_source=True)), source)
-    for part in parts:
-        whole.seconds |= part.seconds
-        whole.counts |= part.counts
-        whole.change_clusters += part.change_clusters
-        whole.leads += part.leads
-        whole.cases += part.cases
-    return whole
+    tally.detector = whole
+    return tally
 
 
-def _curve(detector: Detector, at_home: Sequence[Scored], source: str) -> Curve:
-    tally = Tally(AtLimits(detector, _grid(detector, at_home)), source)
-    for each in at_home:
-        tally.count(each.scene, each.view, each.score)
-    return tally.curve()
-
-
-def _grid(detector: Detector, at_home: Sequence[Scored]) -> FloatArray:
+def _grid(detector: Detector, at_home: Sequence[Scored], lead: float) -> FloatArray:
     """Scores at which counts change, none below the most sensitive threshold of the detector's own curve.
 
-    Where nothing moves no threshold alarms, and only that one stands for what a developer would take.
+    Of cut-ins the highest until so long before the marking [s]. Where nothing moves no threshold alarms, and only the
+    most sensitive one stands for what a developer would take.
     """
-    peaks, reached = [], []
+    peaks, reached, early = [], [], round(lead / STEP)
     for each in at_home:
         score = np.where(each.view.watched, each.score, NO_DANGER)
         keeping = each.view.truth.keeping & each.view.watched
         higher = score[1:-1] >= np.maximum(score[:-2], score[2:])
         peaks.append(score[1:-1][higher & keeping[1:-1]])
-        reached += [float(score[c.begin : max(c.crossing, c.begin + 1)].max()) for c in cut_ins_of(each.view)]
+        reached += [float(score[c.begin : max(c.crossing - early, c.begin + 1)].max()) for c in cut_ins_of(each.view)]
     ordered = np.sort(np.concatenate([*peaks, detector.limits[:1]]))[::-1]
     ranks = np.unique(np.round(np.geomspace(1, len(ordered), GRID)).astype(np.int64)) - 1
     below = np.nextafter(np.array(reached), -np.inf)  # alarms are above a limit

@@ -21,7 +21,7 @@ app = group_of_verbs()
     app, "detect", VERBS["detect"],
     "detect cut-in.xosc --variants 5 -p motorway --detector lateral-speed:threshold=0.15,hold=0.4",
     "detect scenarios/ drives.parquet -o table.csv --report detectors.html",
-    "detect recording.csv --road road.xodr --detector logistic --train scenarios/ --sensor usual",
+    "detect recording.csv --road road.xodr --detector logistic --home scenarios/ --sensor usual",
     'detect cut-in.xosc --ego Ego --detector "python mine.py"',
     "detect cut-in.xosc --like motorway --count 2 -o cut-ins.csv --report cut-ins.html",
 )
