@@ -105,6 +105,7 @@ def test_strict_types_hold_in_the_package_and_for_tasks_written_from_the_docs(tm
     mypy("--strict", str(tmp_path / "tasks.py"), str(plugin))  # with what the first run remembers of the package
 
 
+@pytest.mark.pages
 def test_a_frame_and_its_file_give_the_same_profile(drive, tmp_path):
     drive.to_csv(tmp_path / "d.csv.gz", index=False)
     drive.to_parquet(tmp_path / "d.parquet")

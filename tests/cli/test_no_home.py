@@ -43,6 +43,7 @@ for words in (
 """
 
 
+@pytest.mark.pages
 @pytest.mark.skipif(sys.platform == "win32", reason="homes of POSIX users")
 def test_everything_runs_without_a_home_and_without_a_cache(tmp_path: Path) -> None:
     environment = {"PATH": os.environ["PATH"], "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}

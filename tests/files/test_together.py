@@ -92,7 +92,14 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module", params=VERBS)
+AT_LENGTH = ("evaluate", "close-loop")
+"""Verbs that take seconds a run."""
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.pages] if name in AT_LENGTH else []) for name in VERBS],
+)
 def verb(
     request: pytest.FixtureRequest, given: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Callable[[Path], int], dict[str, bytes], dict[str, bytes], Path]:

@@ -204,6 +204,7 @@ def test_tags_and_metadata_go_into_a_library_and_find_their_profile_again(tmp_pa
     assert one["offset"].equals(same["offset"]) and not other["offset"].equals(same["offset"])
 
 
+@pytest.mark.pages
 def test_profiles_are_as_far_from_each_other_in_whatever_order_they_are_named(tmp_path):
     left, wide = (str(tmp_path / f"{name}.json") for name in ("left", "wide"))
     xl.write_profile(derive_profile("motorway", mean=0.6, name="left").profile, left)

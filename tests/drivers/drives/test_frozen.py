@@ -52,6 +52,7 @@ def test_made_drives_that_stand_still_are_no_frozen_cameras() -> None:
         assert not frozen_rows(time, offset, WIDTH + 0.0 * time).any()
 
 
+@pytest.mark.pages
 def test_fit_says_what_was_measured_and_what_it_used(tmp_path: Path, capsys) -> None:
     table = measured(frozen=10.0).assign(speed=np.linspace(25.0, 35.0, 7500), driver="anna")
     for name, sign in (("d", 1.0), ("turned", -1.0)):

@@ -24,6 +24,7 @@ def rural() -> DriverProfile:
     return read_profile(find_profile("rural"))
 
 
+@pytest.mark.pages
 def test_a_driver_sampled_at_a_low_speed_and_fitted_is_told_apart_from_nobody(rural: DriverProfile) -> None:
     offsets = free_runs(rural, 1, drivers=9, duration=600.0, speed=SPEED)
     time = 0.2 * np.arange(offsets.shape[1], dtype=np.float64)

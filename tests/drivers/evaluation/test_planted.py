@@ -31,6 +31,7 @@ def test_through_whatever_sensor_the_driver_himself_is_like_and_another_is_not(t
     assert found["driver"] == "unlike" and "mean square about the measured mean" in words, (name, words)
 
 
+@pytest.mark.pages
 @pytest.mark.slow
 def test_a_camera_at_5_hz_is_not_held_against_the_driver():
     if not CAMERA.is_file():

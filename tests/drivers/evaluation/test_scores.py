@@ -182,6 +182,7 @@ def test_runs_shorter_than_a_snippet_give_none():
     assert len(snippets_of([_run(np.zeros(20), "a")], 10.0, STEP)) == 0
 
 
+@pytest.mark.pages
 def test_a_profile_is_as_close_to_what_it_generates_as_that_is_to_itself(profile):
     made = [_run(row, f"s{k}") for k, row in enumerate(free_runs(profile, 3, drivers=40, duration=100.0))]
     scores = score_profile(profile, made, seed=1, classify=False)
@@ -196,6 +197,7 @@ def test_a_foreign_driver_is_far_away(profile):
     assert restless.snippets.ratio > 2.0
 
 
+@pytest.mark.pages
 def test_two_levels_miss_the_differences_as_the_paper_reports(profile):
     scores = score_profile(profile, _swaying(5, 20), seed=2, classify=False)
     ratio = {

@@ -96,6 +96,7 @@ def test_what_anybody_wrote_there_says_nothing(rural):
         assert in_words(odd) == "" == margins_in_words(odd)
 
 
+@pytest.mark.pages
 def test_who_is_derived_from_a_doubted_profile_says_so(rural):
     found = {"numbers": {"skewness of the offset": [1.2, 0.0]}, "not_as_measured": ["skewness of the offset"]}
     doubted = replace(rural, provenance=replace(rural.provenance, fit={"look": found}))

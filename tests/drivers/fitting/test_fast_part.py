@@ -114,6 +114,7 @@ def drives(
     return found
 
 
+@pytest.mark.pages
 def test_a_second_recording_gives_back_what_the_provider_took() -> None:
     """The movement at 25 m/s: with the second recording as planted, without it there is none."""
     smoothed, clean = drives(5, name="s", smooth=True), drives(5, name="c")

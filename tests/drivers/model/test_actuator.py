@@ -38,6 +38,7 @@ STEPPED: list[dict[str, float]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", ["motorway", REFINED])
 def test_a_column_that_steps_throws_nobody_and_is_responded_to_in_the_end(name: str) -> None:
     profile = read_profile(name)

@@ -95,6 +95,7 @@ def test_every_part_has_a_clause_and_every_claim_of_ours_its_test():
     }  # ISO 26262-8:2018, table 3  # fmt: skip
 
 
+@pytest.mark.pages
 def test_claims_are_computed_here_and_a_broken_one_turns_red(quick, monkeypatch, tmp_path):
     made = xl.dossier("motorway", recompute=True)
     computed = {"repeatable", "reproducible", "played", "events", "contacts"}

@@ -275,6 +275,7 @@ def test_it_runs_where_this_package_is_not(version: str, tmp_path: Path) -> None
     assert float(done.stdout) > 0.0
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_sources_compile_without_a_warning_and_several_units_link_into_one_program(name: str, tmp_path: Path) -> None:
     sources = []

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.identify import identify
 
 
+@pytest.mark.pages
 def test_a_column_that_changes_once_has_time_beside_it_and_one_that_comes_and_goes_has_not() -> None:
     rng = np.random.default_rng(9)
     n = round(1800.0 / 0.2)

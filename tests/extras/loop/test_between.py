@@ -71,6 +71,7 @@ def test_what_goes_with_a_drives_place_is_found_and_sized() -> None:
     assert 10.0 * effect.errors[0] < 0.08  # type: ignore[attr-defined]
 
 
+@pytest.mark.pages
 def test_chance_finds_columns_between_drives_as_often_as_it_says() -> None:
     probabilities = []
     for seed in range(30):
@@ -85,6 +86,7 @@ def test_few_drives_say_nothing_between_them() -> None:
     assert outcome_of(drives(np.random.default_rng(3), 12, size=0.3))[1] is None
 
 
+@pytest.mark.pages
 def test_the_loop_adds_it_and_comes_closer_on_drives_that_it_did_not_fit() -> None:
     own = drives(np.random.default_rng(5), 40, size=0.3, seconds=60.0)
     base = fit_profile(own, name="paper", model=ModelKind.TWO_LEVEL)  # which does not know what speed does

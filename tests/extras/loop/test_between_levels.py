@@ -41,6 +41,7 @@ def test_between_few_drives_nothing_is_compared() -> None:
     assert not is_undone_by_levels(fit_model(population(1, between=-0.2, drives=6), (TERM,)), TERM)
 
 
+@pytest.mark.pages
 def test_it_is_taken_back_with_its_reason() -> None:
     coarse = population(2, between=-0.2)
     selection = select(

@@ -211,6 +211,7 @@ def test_what_cannot_be_told_is_taken_back(coarse: Coarse, monkeypatch: pytest.M
     assert [one.columns for one in found.rejected if one.was_found] == [("x",)]
 
 
+@pytest.mark.pages
 def test_closing_words_that_fail_cost_no_finding(driven: Callable[..., list[Drive]], monkeypatch: Any) -> None:
     def breaks(*_: object, **__: object) -> None:
         raise ValueError("matmul")

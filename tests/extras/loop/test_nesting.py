@@ -15,6 +15,7 @@ from xosc_lateral.extras.loop.terms.mean import MeanTerm
 from xosc_lateral.extras.loop.timeline import COARSE
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("acts", [True, False])
 def test_a_fold_without_evidence_scores_nothing_and_is_judged_by_its_best(acts: bool) -> None:
     rng = np.random.default_rng(5)

@@ -50,6 +50,7 @@ def test_regimes_that_are_known_are_not_found_again() -> None:
     assert alone < 1e-3 < 0.01 < beside
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("memory", [1.0, 3.0, 6.0])
 def test_clusters_of_seconds_are_no_regimes(memory: float) -> None:
     valid = np.ones(N, dtype=np.bool_)

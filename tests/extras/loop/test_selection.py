@@ -25,6 +25,7 @@ from xosc_lateral.extras.loop.timeline import join_drives
 from xosc_lateral.files.drives import read_drives
 
 Driven = Callable[..., list[Drive]]
+pytestmark = pytest.mark.pages  # the loop in short: `test_every_finding`
 
 
 def effect_of(selection: Selection, columns: tuple[str, ...]) -> ColumnEffect:

@@ -78,6 +78,7 @@ def test_a_result_that_comes_as_its_worker_dies_is_lost_and_not_a_bug(is_lost: b
     assert error is not None and pool.lost(error) is is_lost
 
 
+@pytest.mark.pages
 def test_no_scheduler_at_the_address_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_cluster, "CONNECT_TIMEOUT", 0.5)
     batch = plan_batch([make_inputs(tmp_path / "in", 1)], tmp_path / "out")

@@ -57,6 +57,7 @@ def test_evaluate_prints_one_json_object_with_everything(table, profile, capsys)
     assert values["provenance"]["fitted_on_these"] is True
 
 
+@pytest.mark.pages
 def test_a_profile_scored_on_the_drives_it_was_fitted_to_says_so(table, profile, capsys):
     assert main(["evaluate", "-p", "motorway", str(table), "--json", "--no-classify"]) == 0
     assert json.loads(capsys.readouterr().out)["provenance"]["fitted_on_these"] is False
@@ -190,6 +191,7 @@ def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
     assert compared["distance"][0][1] == compared["distance"][1][0] > compared["distance"][0][0] > 0
 
 
+@pytest.mark.pages
 def test_a_profile_has_the_same_figures_wherever_they_are_stated(capsys):
     """List, card and comparison, alone and in company."""
     assert main(["profiles", "show", "rural"]) == 0

@@ -220,15 +220,17 @@ def lane_keeping(
             "restlessness": (np.diff(drives[:, :rows], axis=1) ** 2).mean(axis=1) / step**2,
         }
 
-    figures = {name: float(values.mean()) for name, values in by_drive(drives.shape[1]).items()}
+    whole = by_drive(drives.shape[1])
+    figures = {name: float(values.mean()) for name, values in whole.items()}
     for name in ("sdlp", "restlessness"):
         figures[name] = float(np.sqrt(figures[name]))
     errors = {}
     if recorded is not None and len(drives) > 1:
         seconds, count = recorded
         rows = min(max(round(seconds / count / step), 2), drives.shape[1])
+        parts = whole if rows == drives.shape[1] else by_drive(rows)
         stretches = max(seconds / (rows * step), 1.0)
-        errors = {name: float(values.std(ddof=1)) / stretches**0.5 for name, values in by_drive(rows).items()}
+        errors = {name: float(values.std(ddof=1)) / stretches**0.5 for name, values in parts.items()}
         for name in ("sdlp", "restlessness"):
             errors[name] /= 2.0 * figures[name] or 1.0
     return LaneKeeping(**figures, memory=_memory(within, step), errors=errors, limit_near_line=limit)
