@@ -254,7 +254,8 @@ def check(plan: Plan, written: Written, first: Look) -> Written:
     unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
     movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    known = {gap.names for gap in (*movement.new_contacts, *movement.lost_contacts)}
+    warned = list(kept.warnings(unmoved, known))
     if settings.player_library is not None:
         warned += told_by_player(
             settings.player_library, plan.source, (plan.output, best.file.data or b""), equivalence.runs,

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
-from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, largest_of, later
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, NEW, Change, Comparison, largest_of, later
 from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
@@ -62,7 +62,8 @@ class EquivalentPaths:
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
+        new = (one for one in self.changes if one.pair is not None and one.how == NEW)
+        return tuple(str(one) for one in new if one.pair not in nominal)
 
     def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
         """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
