@@ -204,14 +204,13 @@ class Enriched:
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""
-        for gap in self.new_contacts:
-            what = f"{' and '.join(gap.names)} touch at {gap.time:.1f} s, and without the offsets they do not"
-            yield Note(what, is_warning=True, run=NOMINAL_RUN)
+        whats = [(gap, f"touch at {gap.time:.1f} s, and without the offsets they do not") for gap in self.new_contacts]
         for gap in self.lost_contacts:
-            what = f"'{gap.names[0]}' and '{gap.names[1]}' do not touch, as they do at {gap.time:.1f} s without the offsets"
-            yield Note(what, is_warning=True, run=NOMINAL_RUN)
+            whats.append((gap, f"do not touch, as they do at {gap.time:.1f} s without the offsets"))
+        for gap, what in whats:
+            yield Note(f"'{gap.names[0]}' and '{gap.names[1]}' {what}", is_warning=True, run=NOMINAL_RUN)
         for departure in self.departures:
-            what = f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
+            what = f"'{departure.name}' leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             yield Note(what, is_warning=True, entity=departure.name, run=NOMINAL_RUN)
         for entity in self.entities:
             unknown = f"{', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
