@@ -39,7 +39,8 @@ TELLING = {
     "event starts": "happens|comes|shifts", "event ends": "is over|lasts", "event lost": "no longer happens",
     "event never ends": "is over|no longer", "event added": "is new|once more", "order changes": "comes before",
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
-    "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides", "turns at rest": "turns",
+    "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
+    "turns at rest": "turns",
     "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "moves|move sideways",
 }  # fmt: skip
 """Words of the messages that tell a kind, by how it begins."""

@@ -204,11 +204,13 @@ class Enriched:
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""
-        whats = [(gap, f"touch at {gap.time:.1f} s, and without the offsets they do not") for gap in self.new_contacts]
-        for gap in self.lost_contacts:
-            whats.append((gap, f"do not touch, as they do at {gap.time:.1f} s without the offsets"))
-        for gap, what in whats:
-            yield Note(f"'{gap.names[0]}' and '{gap.names[1]}' {what}", is_warning=True, run=NOMINAL_RUN)
+        for gaps, what in (
+            (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
+            (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
+        ):
+            for gap in gaps:
+                both = "'{}' and '{}' ".format(*gap.names)
+                yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
         for departure in self.departures:
             what = f"'{departure.name}' leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             yield Note(what, is_warning=True, entity=departure.name, run=NOMINAL_RUN)

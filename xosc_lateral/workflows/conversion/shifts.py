@@ -143,7 +143,7 @@ def compare_runs(
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
     touching = [
-        {gap.names: gap.time for gap in gaps_of(run, run.entities) if gap.touches and not set(gap.names) <= set(ignored)}
+        {one.names: one.time for one in gaps_of(run, run.entities) if one.touches and not set(one.names) <= {*ignored}}
         for run in (before, after)
     ]
     findings = []

@@ -52,7 +52,7 @@ class Gap(Struct, frozen=True):
 
 
 def gaps_of(motion: NominalMotion, paths: Sequence[Track]) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of a run that meets, who walks and what lies there included; `paths`: one per entity."""
+    """Smallest gap of each pair of a run that meets, who walks and what lies there, too; `paths`: one per entity."""
     every = slice(None, None, max(1, round(GAP_STEP / motion.step)))
     if len(paths) < 2:
         return ()

@@ -21,7 +21,6 @@ from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import (
     Check,
     Checks,
-    EntityCheck,
     EntityChecks,
     EventElement,
     RunningCondition,

@@ -57,7 +57,7 @@ class RoadNetwork(SurfaceIndex, Routes):
         self.header_offset = header_offset or HeaderOffset()
         """From the coordinates of the file, which all answers are in, to inertial ones."""
         self._found: dict[tuple[object, ...], LaneCoordinates] = {}
-        """Lanes of places that were asked for last: several conditions of a frame ask for one place, who stands again."""
+        """Lanes of places that were asked for last: several conditions of a frame ask for one, and who stands again."""
 
     # ---- names and signs ---------------------------------------------------------------------------------------------
     def index_of(self, road_id: str) -> int:
