@@ -39,10 +39,13 @@ TELLING = {
     "event starts": "happens|comes|shifts", "event ends": "is over|lasts", "event lost": "no longer happens",
     "event never ends": "is over|no longer", "event added": "is new|once more", "order changes": "comes before",
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
-    "corner": "corner", "heading": "is turned", "creeps": "while it stands|is put|slides", "turns at rest": "turns",
+    "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
+    "turns at rest": "turns",
     "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "moves|move sideways",
 }  # fmt: skip
 """Words of the messages that tell a kind, by how it begins."""
+DIFFERS = "in esmini|not played"
+"""Words of those that say, for all that follows, that the reference player plays the source otherwise."""
 
 
 def wrap(angle):
@@ -68,10 +71,13 @@ def told(finding, messages):
     words = next((words for kind, words in TELLING.items() if finding["kind"].startswith(kind)), "")
     names = [f"'{name}'" for name in (finding["who"], finding.get("event")) if name]
     for entity, text in messages:
-        if not words or not re.search(words, text) or not (entity == finding["who"] or any(n in text for n in names)):
-            continue
+        about = entity == finding["who"] or any(name in text for name in names)
         times = [float(one) for one in re.findall(r"(\d+(?:\.\d+)?) s\b", text)]
-        if finding.get("ego", "nominal") != "nominal" or "more run" in text or "of the time that" in text:
+        if about and re.search(DIFFERS, text) and min(times, default=0.0) <= finding["t"] + SAME_TIME:
+            return True
+        if not (about and words and re.search(words, text)):
+            continue
+        if finding.get("ego", "nominal") != "nominal" or re.search("more run|of the time that|never moves", text):
             return True
         if any(abs(one - t) <= SAME_TIME for one in times for t in (finding["t"], finding.get("since", finding["t"]))):
             return True
@@ -81,7 +87,8 @@ def told(finding, messages):
 def occurrences(run, names):
     found = {}
     for name, kind, state, t in run["states"]:
-        if kind == EVENT and state in (RUNNING, DONE) and name in names:
+        has_begun = state == RUNNING or (name, RUNNING) in found  # the end of a run ends what never began, too
+        if kind == EVENT and state in (RUNNING, DONE) and name in names and has_begun:
             found.setdefault((name, state), []).append(t)
     return found
 

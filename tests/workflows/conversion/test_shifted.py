@@ -22,7 +22,8 @@ from tests.kit.stage import (
     to_lane,
     when,
 )
-from xosc_lateral.workflows.conversion.equivalent_paths import shrink_until_equivalent
+from xosc_lateral.workflows.conversion.across import Way
+from xosc_lateral.workflows.conversion.equivalent_paths import Ways, largest_equivalent
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
@@ -81,23 +82,43 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
         large = [one for one in some if one.entity == "A" and one.after is None and _largest(one) > 0.034]
         return None, [change if large else Comparison((), ())]
 
-    _, kept = shrink_until_equivalent(paths, _nobody(), attempt)
+    _, kept = largest_equivalent(lambda _: paths, _nobody(), attempt)
     assert kept.changes == ()
     assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (0.25, False)}
     assert "offsets of 'A' are 0.25 times what was sampled before a maneuver" in next(kept.warnings(())).what
 
 
+def test_lane_changes_lead_across_as_far_as_that_changes_nothing() -> None:
+    """Planted: drivers' way of A's lane change costs an event, the written one that ends aside does not."""
+    change = Comparison((), (Change("event 'cut in' of 'B' at 8.00 s", "B", 8.0, "no longer happens"),))
+    tried = list[list[tuple[str, Way]]]()
+
+    def made(ways: Ways) -> list[OffsetPath]:
+        led = [replace(_path(name, ("across",)), instead=True) for name in "AC" if ways.get(name) is not Way.WRITTEN]
+        tried.append([*ways.items()])
+        return [_path("A", None), *led, _path("B", None)]
+
+    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
+        leads = any(one.instead and one.entity == "A" for one in some) and ("A", Way.ASIDE) not in tried[-1]
+        return None, [change if leads else Comparison((), ())]
+
+    _, kept = largest_equivalent(made, _nobody(), attempt)
+    assert kept.changes == () and kept.smaller == {} and kept.ways == {"A": Way.ASIDE}
+    assert not any(name == "C" for ways in tried for name, _ in ways)
+    assert "end where its driver is then" in next(kept.warnings(())).what
+
+
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
     change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
     paths = [_path("A", None), _path("B", None)]
-    _, kept = shrink_until_equivalent(paths, _nobody(), lambda *_: (None, [change]))
+    _, kept = largest_equivalent(lambda _: paths, _nobody(), lambda *_: (None, [change]))
     assert kept.paths == tuple(paths) and kept.smaller == {}
     assert kept.changes == change.changes
 
 
 def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
-    """Whoever contradicts each trial sees all of them: none is larger than what was sampled, nor on the other side."""
+    """Who is content with nothing less than nobody's moving sees all trials: none is larger than what was sampled."""
     places = np.random.default_rng(3).uniform(-0.4, 0.4, (2, 6)).round(3)
     paths = [
         OffsetPath(
@@ -110,10 +131,10 @@ def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
     def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
         tried.extend(some)
         change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
-        return None, [Comparison((), (change,) if len(tried) < 60 else ())]
+        return None, [Comparison((), (change,) if any(path.entity == "A" for path in some) else ())]
 
-    shrink_until_equivalent(paths, _nobody(), attempt)
-    assert len({path.start for path in tried}) > 4
+    largest_equivalent(lambda _: paths, _nobody(), attempt)
+    assert len({path.start for path in tried}) == 4
     for path in tried:
         sampled = places["AB".index(path.entity)]
         for piece in path.pieces:

@@ -76,7 +76,7 @@ FIELD = Path(__file__).resolve().parents[4] / "shared" / "cases" / "field"
     [
         ("jump_blamed_on_the_road/ld5", "a LongitudinalDistanceAction without dynamic constraints puts it"),
         ("contact_point_contradicts_geometry/contact", "contactPoint='end' of the successor of road '1' contradicts"),
-        ("ttc_rising_at_zero/scenario", "holds from the start on, and so does not rise"),
+        ("ttc_rising_at_zero/scenario", "holds at 0 s; in esmini, for which 'Ego' stands in the first frame"),
         ("standing_lane_offset/scenario", "'A' moves sideways while it hardly drives"),
         ("sync_behind_target/scenario", "the place of 'B' lies behind it"),
     ],

@@ -137,7 +137,7 @@ def test_a_speed_profile_beside_another_vehicle_takes_its_speed_as_it_is_and_say
     played = Stage(tmp_path).play(brakes, start=TWO, last=6.0)
     assert entity(played).speed[-1] == pytest.approx(18.0)
     (note,) = played.motion.notes
-    assert note.what == "speeds are relative to that of 'Lead' as it is now: 15.00 m/s" and note.line
+    assert note.what == "speeds are relative to that of 'Lead' as it is now: 15.00 m/s (at 1.00 s)" and note.line
 
 
 def test_a_limit_that_is_missing_is_the_players_and_is_said(tmp_path: Path) -> None:

@@ -6,9 +6,8 @@ triggers and maneuvers, and lane offsets are added.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
 from math import inf
 from pathlib import Path
 from typing import Unpack
@@ -26,18 +25,18 @@ from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.remote import leads_from, sent_back
 from xosc_lateral.files.source import guard_input, guarding_inputs
-from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way, in_words
+from xosc_lateral.workflows.conversion.across import Way, in_words
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.equivalent_paths import changes_of, shrink_until_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import largest_equivalent
 from xosc_lateral.workflows.conversion.event_equivalence import as_played
-from xosc_lateral.workflows.conversion.plan import Plan, decide, other_egos, respects_controllers
+from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
-from xosc_lateral.workflows.conversion.write import Written, write, write_with
+from xosc_lateral.workflows.conversion.write import Written, phases_of, provenance_of, write
 from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
@@ -141,11 +140,11 @@ def convert_scenario(
 def carry_out(plan: Plan) -> Conversion:
     """Sample, write, check."""
     sampled = sample(plan)
-    written = write(plan, sampled)
+    vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
     if plan.is_replay:
-        checked = _look_at_replay(written)
+        checked = _look_at_replay(write((), plan, sampled, vehicles, provenance_of(plan, sampled)))
     else:
-        checked = check(plan, *_as_far_as_equivalent(plan, sampled, written))
+        checked = _as_far_as_equivalent(plan, sampled, vehicles)
     if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
         write_atomically(plan.output, checked.file.data)
     return _conversion(plan, checked)
@@ -215,55 +214,34 @@ def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
     return (written, output, run), comparisons
 
 
-def _as_far_as_equivalent(plan: Plan, sampled: Enriched, written: Written) -> tuple[Written, Look]:
-    """Vehicle by vehicle lane changes as drivers take them, as far as that leaves what happens as it was."""
-    look, ways = _looked_at(plan, written), dict[str, Way]()
-    while different := changes_of(look[1]):
-        theirs = sorted({one.entity for one in written.paths if one.instead})
-        blamed = [name for name in theirs if any(one.entity == name for one in different)]
-        others = [[name] for name in theirs if name not in blamed]
-        for names, lower in product([blamed, *others, theirs], (Way.ASIDE, Way.WRITTEN)):
-            tried = ways | {name: lower for name in names if ways.get(name, Way.ACROSS) > lower}
-            if tried == ways:
-                continue
-            trial = write(plan, sampled, tried)
-            outcome = _looked_at(plan, trial, len(different))
-            if len(changes_of(outcome[1])) < len(different):
-                written, look, ways = trial, outcome, tried
-                break
-        else:
-            break
-    why = "with the way that drivers take, what happens would happen otherwise"
-    lines = (f"lane changes of '{name}' {WAY_WORDS[way]}: {why}" for name, way in sorted(ways.items()))
-    words = in_words(written.paths, plan.played.motion)
-    return replace(written, stays=(*words, *written.stays, *lines)), look
-
-
-def check(plan: Plan, written: Written, first: Look) -> Written:
-    """Make moves of a reactive output smaller where they change events, given a look at it."""
-    settings = plan.settings
+def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
+    """A reactive output whose vehicles move as far as that leaves what happens as it was, and what is said of it."""
+    settings, provenance, phases = plan.settings, provenance_of(plan, sampled), phases_of(plan, sampled)
     equivalence = plan.prepared.equivalence(tuple(plan.egos))
+    names = [entity.name for entity in sampled.entities if entity.name in vehicles.lane_offsets]
+
+    def made(ways: Mapping[str, Way]) -> list[OffsetPath]:
+        return [path for name in names for path in phases(name, ways.get(name))[0]]
 
     def attempt(paths: Sequence[OffsetPath], most: float) -> Look:
-        if paths is written.paths:
-            return first
-        return _looked_at(plan, write_with(paths, plan, sampled, written.vehicles, written.provenance), most)
+        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance), most)
 
-    sampled = written.movement
-    (best, output, run), kept = shrink_until_equivalent(written.paths, plan.played.motion, attempt)
-    unmoved = written.vehicles.lane_offsets - best.with_lane_offsets
+    (best, output, run), kept = largest_equivalent(made, plan.played.motion, attempt)
+    unmoved = vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
-    movement = as_played(written.movement, output, run, best.with_lane_offsets, unmoved)
-    warned = list(kept.warnings(unmoved, {gap.names for gap in movement.new_contacts}))
+    movement = as_played(sampled, output, run, best.with_lane_offsets, unmoved)
+    known = {gap.names for gap in (*movement.new_contacts, *movement.lost_contacts)}
+    warned = list(kept.warnings(unmoved, known))
     if settings.player_library is not None:
         warned += service("told_by_player")(
             settings.player_library, plan.source, (plan.output, best.file.data or b""), equivalence.runs,
             plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip
+    stays = (line for name in names for line in phases(name, kept.ways.get(name))[1])
     return replace(
         best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
-        stays=written.stays,
+        stays=(*in_words(best.paths, plan.played.motion), *stays),
     )  # fmt: skip
 
 

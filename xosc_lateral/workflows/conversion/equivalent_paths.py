@@ -3,35 +3,34 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TypeVar
 
 from xosc_lateral.base.note import Note
+from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
-from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, Change, Comparison, largest_of, later
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, NEW, Change, Comparison, largest_of, later
 from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
 
 CHANGES = "with offsets, what happens would happen otherwise"
 
-SIZES = (1.0, 0.5, 0.25, 0.0)
+SIZES = (0.5, 0.25, 0.0)
 """Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
-TRIALS = 3
-"""Of a vehicle: if what happens is otherwise still, it stays as written if that mends it. [-]"""
 LATE, LATE_END = 0.1, 0.5
 """By which an event begins and ends earlier or later without a word, if it is explained. [s]"""
 LEAST_MOVING = 0.9
 """Share of driving time below which it is told. [-]"""
 MOST_TRIALS = 12
-"""Of a conversion: beyond, what is left is told. [-]"""
+"""Of a conversion: beyond, nobody else is tried, and what is left is told. [-]"""
 
 Output = TypeVar("Output")
 
-Sizes = dict[int, float]
-"""By the number of a path, where it is driven otherwise than sampled."""
+Sizes = dict[tuple[str, int], float]
+"""By the entity and number among its paths, where one is driven otherwise than sampled."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +41,7 @@ class EquivalentPaths:
     comparisons: tuple[Comparison, ...]
     changes: tuple[Change, ...]
     smaller: dict[str, tuple[float, bool]]  # entity -> least size of its offsets; whether all paths are smaller
+    ways: Mapping[str, Way]  # entity -> how its lane changes lead across, where not as they should
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
@@ -62,7 +62,8 @@ class EquivalentPaths:
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        return tuple(str(one) for one in self.changes if one.pair is not None and one.pair not in nominal)
+        new = (one for one in self.changes if one.pair is not None and one.how == NEW)
+        return tuple(str(one) for one in new if one.pair not in nominal)
 
     def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
         """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
@@ -76,6 +77,8 @@ class EquivalentPaths:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
                 yield Note(f"offsets of '{name}' are {size}{where}: {CHANGES}", is_warning=True, entity=name)
+        for name, way in sorted(self.ways.items()):
+            yield Note(f"lane changes of '{name}' {WAY_WORDS[way]}: {CHANGES}", entity=name)
         for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
@@ -115,47 +118,77 @@ class EquivalentPaths:
             yield worst.note(run, len(alikes) - 1)
 
 
-def shrink_until_equivalent(
-    paths: Sequence[OffsetPath],
+Ways = dict[str, Way]
+Trial = tuple[Ways, Sizes]
+
+
+def largest_equivalent(
+    made: Callable[[Ways], Sequence[OffsetPath]],
     motion: NominalMotion,
     attempt: Callable[[Sequence[OffsetPath], float], tuple[Output, list[Comparison]]],
 ) -> tuple[Output, EquivalentPaths]:
-    """Paths as large as leave what happens as it was, and the output with them.
+    """The largest movement that leaves what happens as it was, as far as any of it does, and the output with it.
 
-    `attempt` writes some and plays, until as much happens otherwise as it is told.
+    Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended.
+
+    - `made`: paths where lane changes of some vehicles lead across otherwise than they should
+    - `attempt`: writes paths and plays, until as much happens otherwise as it is told
     """
-    sizes: Sizes = {}
-    trials = 1
 
-    def applied(some: Sizes) -> list[OffsetPath]:
-        driven = [resized(path, some[k]) if k in some else path for k, path in enumerate(paths)]
+    def applied(ways: Ways, sizes: Sizes) -> list[OffsetPath]:
+        numbers, driven = Counter[str](), list[OffsetPath]()
+        for path in made(ways):
+            key = path.entity, numbers[path.entity]
+            numbers[path.entity] += 1
+            driven.append(resized(path, sizes[key]) if key in sizes else path)
         return [path for path in driven if path.pieces or path.settles]
 
-    output, comparisons = attempt(paths, inf)
-    changes = changes_of(comparisons)
-    given_up, tried = set[int](), Counter[str]()
-    while changes and trials < MOST_TRIALS:
-        blamed = _blamed(changes, paths, motion, sizes, given_up)
-        if blamed is None:
+    kept: Trial = {}, {}
+    output, comparisons = attempt(applied(*kept), inf)
+    changes, trials = changes_of(comparisons), 1
+    names = dict.fromkeys(path.entity for path in made({}))
+    for name in dict.fromkeys([*(one.entity for one in changes if one.entity in names), *names]):
+        if not changes or trials >= MOST_TRIALS:
             break
-        name = paths[blamed].entity
-        theirs = [k for k, path in enumerate(paths) if path.entity == name and not path.instead]
-        ways: list[Sizes] = [{blamed: smaller} for smaller in SIZES[SIZES.index(sizes.get(blamed, 1.0)) + 1 :]]
-        for way in ways[: max(TRIALS - tried[name], 0)] or [dict.fromkeys(theirs, SIZES[-1])]:
-            trial = sizes | way
-            made, outcome = attempt(applied(trial), len(changes))
+        fewest, before = len(changes), kept
+        for number, (ways, sizes) in enumerate(_smaller(name, changes, made, motion)):
+            trial = before[0] | ways, before[1] | sizes
+            tried, outcome = attempt(applied(*trial), fewest)
             trials += 1
-            tried[name] += 1
-            if len(changes_of(outcome)) < len(changes):
-                sizes, output, comparisons, changes = trial, made, outcome, changes_of(outcome)
+            is_better = len(changes_of(outcome)) < fewest
+            if is_better:
+                kept, output, comparisons = trial, tried, outcome
+            if is_better is (number > 0):  # not its fault; or all that it may move
                 break
-        else:
-            given_up |= {*theirs} if tried[name] > TRIALS else {blamed}
+            fewest = len(changes_of(comparisons)) + 1
+        changes = changes_of(comparisons)
     least: dict[str, tuple[float, bool]] = {}
-    for name in dict.fromkeys(paths[k].entity for k in sizes):
-        theirs = [k for k, path in enumerate(paths) if path.entity == name]
-        least[name] = min(sizes.get(k, 1.0) for k in theirs), all(k in sizes for k in theirs)
-    return output, EquivalentPaths(tuple(applied(sizes)), tuple(comparisons), tuple(changes), least)
+    for name in dict.fromkeys(name for name, _ in kept[1]):
+        theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
+        least[name] = min(theirs), max(theirs) < 1.0
+    return output, EquivalentPaths(tuple(applied(*kept)), tuple(comparisons), tuple(changes), least, kept[0])
+
+
+def _smaller(
+    name: str, changes: Sequence[Change], made: Callable[[Ways], Sequence[OffsetPath]], motion: NominalMotion
+) -> Iterator[Trial]:
+    """Of one vehicle: nothing at all, then less and less of lane changes and of the path before the first change."""
+
+    def begins(path: OffsetPath) -> float:
+        starts = [one.start for one in motion.actions if one.path == path.after]
+        return 0.0 if path.after is None else min(starts, default=inf)
+
+    leads = any(path.instead for path in made({}) if path.entity == name)
+    written: Ways = {name: Way.WRITTEN} if leads else {}
+    starts = [begins(path) for path in made(written) if path.entity == name]
+    yield written, {(name, k): 0.0 for k in range(len(starts))}
+    if leads:
+        yield {name: Way.ASIDE}, {}
+        yield written, {}
+    first = min((one.time for one in changes if one.entity == name), default=inf)
+    nearest = min(range(len(starts)), key=lambda k: (starts[k] > first, -starts[k]), default=0)
+    for size in SIZES:
+        yield written, {(name, nearest): size}
 
 
 def changes_of(comparisons: Iterable[Comparison]) -> list[Change]:
@@ -164,25 +197,3 @@ def changes_of(comparisons: Iterable[Comparison]) -> list[Change]:
     for change in (one for comparison in comparisons for one in comparison.changes):
         first.setdefault(change.what, change)
     return list(first.values())
-
-
-def _blamed(
-    changes: Sequence[Change],
-    paths: Sequence[OffsetPath],
-    motion: NominalMotion,
-    sizes: Sizes,
-    given_up: Collection[int],
-) -> int | None:
-    """The path that most likely changes what happens: its entity's, the nearest before; else any other."""
-
-    def begins(path: OffsetPath) -> float:
-        starts = [one.start for one in motion.actions if one.path == path.after]
-        return 0.0 if path.after is None else min(starts, default=inf)
-
-    order: list[int] = []
-    for change in changes:
-        theirs = [k for k, path in enumerate(paths) if path.entity == change.entity]
-        order += sorted(theirs, key=lambda k: (begins(paths[k]) > change.time, -begins(paths[k])))
-    order += range(len(paths))
-    free = (k for k in order if sizes.get(k, 1.0) > SIZES[-1] and k not in given_up and not paths[k].instead)
-    return next(free, None)

@@ -171,7 +171,7 @@ class EventEquivalence:
                 for some in ((*comparison.changes, *meant), by_chance)
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            remarks = tuple(one for one in findings if not one.is_meaning)
+            remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning))
             comparisons[k] = Comparison(shifts, changes, remarks, by_chance, shares, name)
             if len(changes_of(comparisons.values())) >= most:
                 break

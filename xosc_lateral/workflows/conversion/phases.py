@@ -6,6 +6,7 @@ From its start, from the end of each action that moves it sideways, and from beh
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 from msgspec import structs
@@ -99,7 +100,8 @@ class _Phases:
         self._entity, self._plan, self._network = entity, plan, plan.played.network
         motion = entity.motion
         self._own = [one for one in plan.extended.motion.actions if one.actor == entity.name]
-        self._lateral = {one.path for one in plan.lateral.by_entity.get(entity.name, ())}
+        self._actions = plan.lateral.by_entity.get(entity.name, ())
+        self._lateral = {one.path for one in self._actions}
         self._driven = distance_driven(motion)
         runs = plan.prepared.equivalence(tuple(plan.egos))
         reach = runs.farthest(entity.name)
@@ -111,14 +113,14 @@ class _Phases:
             DriverClock.of_fastest(motions, reach, anywhere=each) for each in (False, True)
         )
         beyond = STEP * float(way_of_clock(self._clock.speed[-1:])[0])
-        self._offset: Offset = deviation_through(
+        sampled: Offset = deviation_through(
             [
                 _sampled(one, motion, self._driven, beyond if one is entity.segments[-1] else 0.0)
                 for one in entity.segments
             ]
         )
-        self._foreseeing = bounded(self._offset, self._clock)
-        self._offset = bounded(self._offset, self._clock_anywhere)
+        self._bounded = cache(lambda clock, is_cut: bounded(sampled, clock, is_cut=is_cut))
+        self._offset: Offset = self._bounded(self._clock_anywhere, False)
         self._spacing = self._spacing_of(motion)
         self.across, self.stays, self._crossed = dict[Path, OffsetPath](), list[str](), dict[Path, float]()
         if lifelike:
@@ -279,8 +281,9 @@ class _Phases:
         cut = min(foreseen, default=np.inf) if is_known else np.inf
         trajectories = (one.path for one in lateral if isinstance(one.action.content, FollowTrajectoryAction))
         cuts = [begin, *([cut] if begin + LEAST_LENGTH < cut < end - LEAST_LENGTH else ()), end]
-        offset: Offset = self._foreseeing if is_known else self._offset
         clock = self._clock if is_known else self._clock_anywhere
+        may_begin = {one.path for one in self._actions if one.path != after or one.repeats}
+        offset: Offset = self._bounded(clock, not may_begin.isdisjoint(depends.begins if is_known else may_begin))
         if start is not None:
             offset = approached(offset, clock, begin, start)
             if cut in cuts and any(actions[path] == cut for path in trajectories):  # which starts without an offset

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -190,10 +190,12 @@ class Enriched:
     @property
     def new_contacts(self) -> tuple[Gap, ...]:
         """Pairs that touch now and did not before."""
-        before: Mapping[tuple[str, str], Gap] = {gap.names: gap for gap in self.gaps_before}
-        return tuple(
-            gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
-        )
+        return _touching_only_in(self.gaps_after, self.gaps_before)
+
+    @property
+    def lost_contacts(self) -> tuple[Gap, ...]:
+        """Pairs that touched before and do not now."""
+        return _touching_only_in(self.gaps_before, self.gaps_after)
 
     @property
     def trouble(self) -> int:
@@ -202,16 +204,25 @@ class Enriched:
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""
-        for gap in self.new_contacts:
-            what = f"{' and '.join(gap.names)} touch at {gap.time:.1f} s, and without the offsets they do not"
-            yield Note(what, is_warning=True, run=NOMINAL_RUN)
+        for gaps, what in (
+            (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
+            (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
+        ):
+            for gap in gaps:
+                both = "'{}' and '{}' ".format(*gap.names)
+                yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
         for departure in self.departures:
-            what = f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
+            what = f"'{departure.name}' leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             yield Note(what, is_warning=True, entity=departure.name, run=NOMINAL_RUN)
         for entity in self.entities:
             unknown = f"{', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
             lines = [unknown] * bool(entity.neutral) + [entity.bound] * (entity.bound is not None)
             yield from warnings((f"{entity.name}: {what}" for what in lines), entity=entity.name)
+
+
+def _touching_only_in(gaps: Sequence[Gap], others: Sequence[Gap]) -> tuple[Gap, ...]:
+    touching = {gap.names for gap in others if gap.touches}
+    return tuple(gap for gap in gaps if gap.touches and gap.names not in touching)
 
 
 class EventShift(Struct, frozen=True):

@@ -47,6 +47,9 @@ ROUNDING = 1e-6
 LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
+NEW = "is new"
+CONTACT_MOVED = 0.25
+"""By which a contact comes earlier or later without a word. [s]"""
 LEAST_WAY = 1e-3
 """A lateral action over less than this has no duration to compare. [m]"""
 
@@ -134,18 +137,27 @@ def compare_runs(
     for key, action in now.items():
         if key not in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what, first = _named(key, action), (*key[:2], 0) not in then
-            how = "is new" if first else "happens once more"
+            how = NEW if first else "happens once more"
             changes.setdefault(what, Change(what, key[1], action.start, how))
     others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
-    contacts = [gap for gap in gaps_of(after, after.entities) if gap.touches and not set(gap.names) <= set(ignored)]
-    touching = {gap.names for gap in gaps_of(before, before.entities) if gap.touches} if contacts else set()
-    for gap in contacts:
-        if gap.names not in touching:
-            what = f"contact of '{gap.names[0]}' and '{gap.names[1]}' at {gap.time:.1f} s"
-            changes.setdefault(what, Change(what, gap.names[0], gap.time, "is new", pair=gap.names))
-    return Comparison(tuple(event_shifts), tuple(changes.values()))
+    touching = [
+        {one.names: one.time for one in gaps_of(run, run.entities) if one.touches and not set(one.names) <= {*ignored}}
+        for run in (before, after)
+    ]
+    findings = []
+    for names, time in (touching[0] | touching[1]).items():
+        at = touching[0].get(names)
+        if at is not None and names in touching[1]:
+            if abs(time - at) > CONTACT_MOVED:
+                what = f"touches '{names[1]}' {later(time - at)} than"
+                findings.append(Finding("contact", names[0], at, abs(time - at), what))
+        elif at is None or at + shifts.largest <= after.end_time - EVENT_TOLERANCE:
+            how = NEW if at is None else "no longer happens"
+            what = f"contact of '{names[0]}' and '{names[1]}' at {time:.1f} s"
+            changes.setdefault(what, Change(what, names[0], time, how, pair=names))
+    return Comparison(tuple(event_shifts), tuple(changes.values()), tuple(findings))
 
 
 def later(moved: float) -> str:

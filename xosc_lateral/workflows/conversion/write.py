@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from types import MappingProxyType
+from functools import cache
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import BEHAVIOUR, __version__
@@ -42,16 +42,11 @@ class Written:
         return frozenset(path.entity for path in self.paths)
 
 
-def write(plan: Plan, sampled: Enriched, ways: Mapping[str, Way] = MappingProxyType({})) -> Written:
-    """Write the output: a replay to its place; a reactive one into memory, since it is still to be checked.
-
-    `ways`: how lane changes of vehicles that react lead across, where not as the settings say.
-    """
-    usual = Way.ACROSS if plan.settings.lane_changes is LaneChanges.LIFELIKE else Way.WRITTEN
-    vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
+def provenance_of(plan: Plan, sampled: Enriched) -> ConversionProvenance:
+    """What goes into an output, as far as it is known before it is written."""
     place = leads_from(plan.source, plan.output).parent
     folder, driven = plan.source.parent, {one.name for one in sampled.entities if one.profile}
-    provenance = ConversionProvenance(
+    return ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
         scenario=f"{relative(folder, place)}/{plan.source.name}",
@@ -68,19 +63,28 @@ def write(plan: Plan, sampled: Enriched, ways: Mapping[str, Way] = MappingProxyT
         modes={},
         content_sha256=PENDING_HASH,
     )
-    reactive = (entity for entity in sampled.entities if entity.name in vehicles.lane_offsets)
-    phases = [
-        paths_of(entity, plan, lifelike=way > Way.WRITTEN, leads=way is Way.ACROSS)
-        for entity, way in ((one, ways.get(one.name, usual)) for one in reactive)
-    ]
-    written = write_with([path for paths, _ in phases for path in paths], plan, sampled, vehicles, provenance)
-    return replace(written, stays=tuple(line for _, lines in phases for line in lines))
 
 
-def write_with(
+def phases_of(plan: Plan, sampled: Enriched) -> Callable[[str, Way | None], tuple[list[OffsetPath], list[str]]]:
+    """Of a vehicle that keeps its maneuvers, and how its lane changes lead across (None: as the settings say): its
+    paths, and which lane changes stay as written, a line each. Each is made once.
+    """
+    usual = Way.ACROSS if plan.settings.lane_changes is LaneChanges.LIFELIKE else Way.WRITTEN
+
+    @cache
+    def phases(name: str, way: Way | None) -> tuple[list[OffsetPath], list[str]]:
+        way = usual if way is None else way
+        return paths_of(sampled.entity(name), plan, lifelike=way > Way.WRITTEN, leads=way is Way.ACROSS)
+
+    return phases
+
+
+def write(
     paths: Sequence[OffsetPath], plan: Plan, sampled: Enriched, vehicles: WrittenAs, provenance: ConversionProvenance
 ) -> Written:
-    """Write the output with these paths for those who keep their maneuvers."""
+    """Write the output with these paths for those who keep their maneuvers: a replay to its place; a reactive one into
+    memory, since it is still to be checked.
+    """
     modes = dict.fromkeys((path.entity for path in paths), OutputMode.LANE_OFFSET.value)
     modes |= dict.fromkeys(vehicles.trajectories, OutputMode.TRAJECTORY.value)
     enriched = sorted(entity.name for entity in sampled.entities if entity.is_enriched)

@@ -15,6 +15,7 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.own_clock import way_of
 from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.world.motion.look import FRAME_TURN, LATERAL_ACCELERATION, LOOK_STEP
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, distance_driven
 
@@ -24,6 +25,9 @@ LEADING_OVER_SHARE = 0.5
 """Part of `LARGEST_TURN_RATE` that leading over to the path may take; the driver's own movement has the rest. [-]"""
 STEP_PEAK = 10.0 / np.sqrt(3.0)
 """Largest second derivative of the smooth step from 0 to 1 in unit time (of 10 u^3 - 15 u^4 + 6 u^5, by hand). [-]"""
+CUT_SHARE = 0.9
+"""Of what the look lets pass in a frame, and from vertex to vertex, that an action may take away which begins there:
+the path's own corners have the rest. [-]"""
 TICK, GRID = 0.1, 0.2
 """Of movement along the clock [s], of the clock along the way: who drives off is a little faster at each place. [m]"""
 
@@ -75,3 +79,8 @@ class DriverClock(Struct, frozen=True, eq=False):
         """Of the lateral acceleration by the clock, at distances. [m/s2]"""
         speed = np.interp(at, self.distance, self.speed)
         return LARGEST_TURN_RATE * np.maximum(speed, MINIMUM_SPEED)
+
+    def limit_where_cut(self, at: FloatArray) -> FloatArray:
+        """Of the lateral speed by the clock, at distances where an action may begin, which takes it away. [m/s]"""
+        speed = np.maximum(np.interp(at, self.distance, self.speed), MINIMUM_SPEED)
+        return CUT_SHARE * np.minimum(FRAME_TURN * speed, LATERAL_ACCELERATION * LOOK_STEP)

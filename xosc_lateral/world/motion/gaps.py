@@ -52,13 +52,12 @@ class Gap(Struct, frozen=True):
 
 
 def gaps_of(motion: NominalMotion, paths: Sequence[Track]) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles of a run that meet; `paths`: one per entity."""
+    """Smallest gap of each pair of a run that meets, who walks and what lies there, too; `paths`: one per entity."""
     every = slice(None, None, max(1, round(GAP_STEP / motion.step)))
-    vehicles = [both for both in zip(motion.entities, paths, strict=True) if both[0].entity.is_vehicle]
-    if len(vehicles) < 2:
+    if len(paths) < 2:
         return ()
     boxes = []
-    for entity, path in vehicles:
+    for entity, path in zip(motion.entities, paths, strict=True):
         absent = (entity.activity[every] & Activity.ACTIVE) == 0
         x = np.where(absent, np.nan, path.x[every])
         y, heading = path.y[every], path.heading[every]

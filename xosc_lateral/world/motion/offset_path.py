@@ -142,10 +142,15 @@ def spacing_of(
     return Spacing(distance, np.concatenate(([0.0], np.cumsum(np.diff(distance) / gap[1:]))), along)
 
 
-def bounded(offset: Offset, clock: DriverClock) -> Offset:
-    """Offsets, smoothed where they would turn the entity faster than `DriverClock.limit` in its fastest run."""
+def bounded(offset: Offset, clock: DriverClock, *, is_cut: bool = False) -> Offset:
+    """Offsets, smoothed where they would turn the entity faster than `DriverClock.limit` in its fastest run; `is_cut`:
+    and where it would have more lateral speed than an action that begins anywhere may take away.
+    """
     at = clock.ticks()
     values, limit = offset(at), clock.limit(at)
+    if is_cut and (np.abs(np.diff(values)) > TICK * clock.limit_where_cut(at[1:])).any():
+        values = _slower(values, np.cumsum(TICK * clock.limit_where_cut(at)))
+        offset = NaturalSpline.natural(at, values)
     ladder, level = [values], np.zeros(len(at))
     for k, width in enumerate(WIDTHS):
         strained = np.abs(np.diff(ladder[-1], 2, prepend=ladder[-1][:1], append=ladder[-1][-1:])) > limit * TICK**2
@@ -163,6 +168,20 @@ def bounded(offset: Offset, clock: DriverClock) -> Offset:
     mixed = (1.0 - share) * stack[below, rows] + share * stack[below + 1, rows]
     spline = NaturalSpline.natural(at, within_heading(mixed, at))
     return lambda distance: spline(np.clip(distance, at[0], at[-1]))
+
+
+def _slower(values: FloatArray, way: FloatArray) -> FloatArray:
+    """The nearest movement, in its largest distance from the given one, that is nowhere faster than so; `way`: the
+    farthest that it may go since the begin, increasing; shape (n,) each. [m]
+
+    Half way between the least movement above and the greatest below: inf- and sup-convolution with a cone.
+    """
+    cones = []
+    for sign in (1.0, -1.0):
+        ahead = np.minimum.accumulate(sign * values - way) + way
+        back = np.minimum.accumulate((sign * values + way)[::-1])[::-1] - way
+        cones.append(sign * np.minimum(ahead, back))
+    return np.asarray(0.5 * (cones[0] + cones[1]))
 
 
 def approached(offset: Offset, clock: DriverClock, begin: float, start: float, *, back: bool = False) -> Offset:

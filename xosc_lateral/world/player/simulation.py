@@ -167,12 +167,13 @@ class Simulation:
             raise place.error(f"entity '{name}' is not in the scenario", PlaybackError)
         return state
 
-    def note(self, what: str, place: Place, *, is_doubt: bool = False) -> None:
+    def note(self, what: str, place: Place, *, is_doubt: bool = False, entity: str | None = None) -> None:
         """Say, once for each place, that something was not played, or not as written; or that it can't be meant so."""
         key = (what, place.path, place.line)
         if key not in self._noted:
             self._noted.add(key)
-            self.notes.append(place.note(what, is_warning=is_doubt))
+            when = "" if entity is None or self.time <= 0.0 else f" (at {self.time:.2f} s)"
+            self.notes.append(place.note(what + when, is_warning=is_doubt, entity=entity))
 
     def values_of(self, content: object) -> tuple[Values, str]:
         """Parameters or variables, whichever an action or a condition refers to, and the name that it gives."""

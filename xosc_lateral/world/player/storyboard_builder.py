@@ -21,7 +21,6 @@ from xosc_lateral.world.player.state import EntityState
 from xosc_lateral.world.player.storyboard import (
     Check,
     Checks,
-    EntityCheck,
     EntityChecks,
     EventElement,
     RunningCondition,
@@ -30,9 +29,8 @@ from xosc_lateral.world.player.storyboard import (
     last_name,
 )
 from xosc_lateral.world.scenario import scenario as read
-from xosc_lateral.world.scenario.conditions import TimeToCollisionCondition
 from xosc_lateral.world.scenario.dependence import entity_references
-from xosc_lateral.world.scenario.enums import ConditionEdge, StoryboardElementType, TriggeringEntitiesRule
+from xosc_lateral.world.scenario.enums import StoryboardElementType, TriggeringEntitiesRule
 from xosc_lateral.world.scenario.global_actions import AddEntityAction
 from xosc_lateral.world.scenario.place import Unsupported
 from xosc_lateral.world.scenario.private_actions import (
@@ -194,22 +192,6 @@ def _trigger(
     return RunningTrigger(tuple(groups), when_empty=when_empty)
 
 
-_RISES = (ConditionEdge.RISING, ConditionEdge.RISING_OR_FALLING)
-
-
-def _noting_edge(check: EntityCheck, condition: read.Condition, simulation: Simulation) -> EntityCheck:
-    """Of a time to collision, which the reference player does not know in its first frame: it sees an edge then."""
-
-    def noting(state: EntityState) -> bool:
-        holds = check(state)
-        if holds and simulation.time == 0.0:
-            what = "holds from the start on, and so does not rise; in esmini it rises in the second frame"
-            simulation.note(what, condition.place)
-        return holds
-
-    return noting
-
-
 def _check(condition: read.Condition, simulation: Simulation) -> Check:
     content = condition.content
     if isinstance(content, Unsupported):
@@ -218,8 +200,6 @@ def _check(condition: read.Condition, simulation: Simulation) -> Check:
     if type(content) in VALUE_CHECKS:
         return VALUE_CHECKS[type(content)](content, simulation)
     check = ENTITY_CHECKS[type(content)](content, simulation)
-    if isinstance(content, TimeToCollisionCondition) and condition.edge in _RISES:
-        check = _noting_edge(check, condition, simulation)
     triggering = condition.triggering_entities
     names = () if triggering is None else triggering.entity_refs
     states = tuple(simulation.entity(name, condition.place) for name in names)

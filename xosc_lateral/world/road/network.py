@@ -25,6 +25,9 @@ from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lan
 from xosc_lateral.world.road.routes import Routes
 from xosc_lateral.world.road.surface import HeaderOffset
 
+MOST_FOUND = 64
+"""Places whose lanes are kept. [-]"""
+
 
 class RoadNetwork(SurfaceIndex, Routes):
     """Roads, lanes and links of one OpenDRIVE file; arguments of a batch broadcast, answers have their shape."""
@@ -53,6 +56,8 @@ class RoadNetwork(SurfaceIndex, Routes):
         """Of the bytes that were parsed; empty: not read from a file."""
         self.header_offset = header_offset or HeaderOffset()
         """From the coordinates of the file, which all answers are in, to inertial ones."""
+        self._found: dict[tuple[object, ...], LaneCoordinates] = {}
+        """Lanes of places that were asked for last: several conditions of a frame ask for one, and who stands again."""
 
     # ---- names and signs ---------------------------------------------------------------------------------------------
     def index_of(self, road_id: str) -> int:
@@ -169,8 +174,14 @@ class RoadNetwork(SurfaceIndex, Routes):
         return located
 
     def _nearest_lane(self, x: float, y: float, z: float | None, lane_types: Collection[str] | None) -> LaneCoordinates:
-        best = self.world_to_lane(x, y, z, lane_types=lane_types)
-        return LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
+        key = x, y, z, lane_types if lane_types is None else frozenset(lane_types)
+        if (found := self._found.get(key)) is None:
+            best = self.world_to_lane(x, y, z, lane_types=lane_types)
+            found = LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
+            if len(self._found) >= MOST_FOUND:
+                self._found.clear()
+            self._found[key] = found
+        return found
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:

@@ -113,7 +113,7 @@ class RunningAction(StoryboardElement):
 
     def note(self, what: str) -> None:
         """Say that something was not played, or not as written."""
-        self.simulation.note(what, self.content.place)
+        self.simulation.note(what, self.content.place, entity=None if self.actor is None else self.actor.name)
 
 
 class AtOnce(RunningAction):

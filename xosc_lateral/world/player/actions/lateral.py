@@ -41,6 +41,7 @@ class RunningLaneChange(RunningToTarget):
             what = f"road '{network.road_ids[state.road]}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there})"
             self._refuse(f"{what}: lane change not played")
             return
+        state.follow_lane()  # along the road at once, though another action may take over in this very frame
         state.turn(0.0 if state.is_forward else pi)
         self._types = state.kept_types(lane)
         kind = network.roads[state.road].section_at(state.s).by_id[lane].type

@@ -114,9 +114,17 @@ def prepare_time_to_collision(content: conditions.TimeToCollisionCondition, simu
         simulation.derives_motion = True
 
         def check(state: EntityState) -> bool:
-            if not other.active or abs(closing := _closing_speed(state, other)) < EPSILON:
+            closing, as_standing = _closing_speed(state, other), state.speed if simulation.time == 0.0 else 0.0
+            fastest = max(abs(closing), abs(as_standing))
+            if not other.active or fastest < EPSILON:
                 return False
-            return _collides(measure.between(state, other, enough=soon * abs(closing)), closing, content)
+            distance = measure.between(state, other, enough=soon * fastest)
+            collides = _collides(distance, closing, content)
+            if simulation.time == 0.0 and collides is not _collides(distance, as_standing, content):
+                what = "holds" if collides else "does not hold"
+                what += f" at 0 s; in esmini, for which '{target}' stands in the first frame, it is the other way round"
+                simulation.note(what, content.place, entity=target)
+            return collides
 
         return check
     spot = spot_at(target, simulation)
