@@ -121,6 +121,23 @@ def test_esmini_plays_it_as_the_source(tmp_path: Path) -> None:
     assert "RoutingAction" in (tmp_path / "out.xosc").read_text() and not made.warnings
 
 
+def test_a_lane_change_by_a_rate_keeps_it_in_proportion_to_its_way(tmp_path: Path) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    text = path.read_text().replace(
+        '<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Ego" value="-1"/>'
+    )
+    path.write_text(text.replace('dynamicsDimension="time" value="5"', 'dynamicsDimension="rate" value="1.5"'))
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
+    assert not [line for line in made.notes if "lane changes of 'A'" in line]
+    (kept,) = etree.parse(str(tmp_path / "out.xosc")).iterfind(".//Event[@name='change']//LaneChangeActionDynamics")
+    assert kept.get("dynamicsDimension") == "rate" and 1.0 < float(kept.get("value")) < 2.0
+    lasts = []
+    for each in (path, tmp_path / "out.xosc"):
+        (action,) = (one for one in play_scenario(each).motion.actions if "change" in one.path)
+        lasts.append(action.end - action.start)
+    assert lasts[1] == pytest.approx(lasts[0], abs=0.05)
+
+
 def test_only_the_vehicle_whose_way_moves_an_event_keeps_the_written_one(tmp_path: Path) -> None:
     waits = (  # B brakes when A is nearly in its lane, where the bell comes at another time
         "<ByEntityCondition><TriggeringEntities "
@@ -143,4 +160,6 @@ def test_only_the_vehicle_whose_way_moves_an_event_keeps_the_written_one(tmp_pat
     path = write_scenario(tmp_path, text)
     made = xl.convert(path, tmp_path / "out.xosc", seed=2)
     assert [line for line in made.notes if "lane change of 'C'" in line and "its driver's" in line]
-    assert [line for line in made.notes if "lane changes of 'A'" in line and "would happen otherwise" in line]
+    assert [
+        line for line in made.notes if "lane changes of 'A'" in line and "with offsets, event 'brake' of 'B' at" in line
+    ]

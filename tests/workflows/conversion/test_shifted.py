@@ -161,3 +161,14 @@ def test_who_is_ignored_may_touch_whoever_else_is_and_nobody_more(tmp_path: Path
     for ignored, count in (((), 1), (("Ego",), 1), (("Lead",), 1), (("Ego", "Lead"), 0)):
         found = compare_runs(before.scenario, before.network, before.motion, touching.motion, ignored=ignored)
         assert sum(change.pair is not None for change in found.changes) == count, ignored
+
+
+def test_on_which_side_of_a_marking_it_ends_is_nothing_where_it_ends_beside_the_marking(tmp_path: Path) -> None:
+    def run(lane: int, aside: float) -> Played:
+        return Stage(tmp_path).play(start={"Ego": teleport(on_lane(lane, 10.0, offset=aside)) + speed(10.0)}, last=2.0)
+
+    edge = run(-1, -1.7)
+    width = edge.network.lane_state_at(0, -1, 10.0).width
+    assert _compare(edge, run(-2, width - 1.8)).changes == (), "0.1 m farther to the right"
+    (change,) = _compare(edge, run(-2, -0.5)).changes
+    assert change.what == "the last lane of 'Ego', -1,"

@@ -248,7 +248,8 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
 def _conversion(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
     movement, file = written.movement, written.file
-    wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
+    stays = [*(stay_as_written(movement) if plan.settings.lane_changes is LaneChanges.LIFELIKE else ()), *written.stays]
+    stays = [line for line in dict.fromkeys(stays) if not any(one.startswith(f"{line};") for one in stays)]
     messages = (
         *plan.played.motion.messages,
         *warnings(other_egos(plan.played.scenario, plan.settings, plan.egos)),
@@ -257,8 +258,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *file.notes,
         *warnings(written.vehicles.frozen),
         *written.warnings,
-        *notes(stay_as_written(movement) if wants_lifelike else ()),
-        *notes(written.stays),
+        *notes(stays),
         *warnings(validity_warnings(movement)),
         *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import TypeVar
 
@@ -42,6 +42,7 @@ class EquivalentPaths:
     changes: tuple[Change, ...]
     smaller: dict[str, tuple[float, bool]]  # entity -> least size of its offsets; whether all paths are smaller
     ways: Mapping[str, Way]  # entity -> how its lane changes lead across, where not as they should
+    mended: Mapping[str, Change] = field(default_factory=dict)  # entity -> what its moves would make happen otherwise
 
     @property
     def shifts(self) -> tuple[EventShift, ...]:
@@ -71,14 +72,14 @@ class EquivalentPaths:
         `known`: contacts in the nominal run that others tell of
         """
         for name in sorted(unmoved & self.smaller.keys()):
-            yield Note(f"'{name}' stays as it is: {CHANGES}", is_warning=True, entity=name)
+            yield self._note(f"'{name}' stays as it is", name, is_warning=True)
         for name, (factor, everywhere) in sorted(self.smaller.items()):
             if name not in unmoved:
                 size = f"{factor:g} times what was sampled" if factor else "none"
                 where = "" if everywhere else " before a maneuver"
-                yield Note(f"offsets of '{name}' are {size}{where}: {CHANGES}", is_warning=True, entity=name)
+                yield self._note(f"offsets of '{name}' are {size}{where}", name, is_warning=True)
         for name, way in sorted(self.ways.items()):
-            yield Note(f"lane changes of '{name}' {WAY_WORDS[way]}: {CHANGES}", entity=name)
+            yield self._note(f"lane changes of '{name}' {WAY_WORDS[way]}", name)
         for name, (share, run) in sorted(self.moving.items()):
             if share < LEAST_MOVING:
                 moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
@@ -106,6 +107,12 @@ class EquivalentPaths:
             what = f"{change.what} {change.how}: it hangs on a frame of the player, without offsets as well"
             yield Note(what, entity=change.entity, run=change.run)
         yield from (change.note for change in self.changes if change.run != NOMINAL_RUN or change.pair not in known)
+
+    def _note(self, what: str, name: str, *, is_warning: bool = False) -> Note:
+        """What is otherwise than sampled, and what would happen else."""
+        change = self.mended.get(name)
+        why = CHANGES if change is None else f"with offsets, {change.what} {change.how}"
+        return Note(f"{what}: {why}", is_warning=is_warning, entity=name, run=None if change is None else change.run)
 
     def _findings(self) -> Iterator[Note]:
         """The worst of each kind for each vehicle, with its run."""
@@ -145,7 +152,7 @@ def largest_equivalent(
 
     kept: Trial = {}, {}
     output, comparisons = attempt(applied(*kept), inf)
-    changes, trials = changes_of(comparisons), 1
+    changes, trials, mended = changes_of(comparisons), 1, dict[str, Change]()
     names = dict.fromkeys(path.entity for path in made({}))
     for name in dict.fromkeys([*(one.entity for one in changes if one.entity in names), *names]):
         if not changes or trials >= MOST_TRIALS:
@@ -158,6 +165,8 @@ def largest_equivalent(
             is_better = len(changes_of(outcome)) < fewest
             if is_better:
                 kept, output, comparisons = trial, tried, outcome
+                left = {one.what for one in changes_of(outcome)}
+                mended.setdefault(name, next((one for one in changes if one.what not in left), changes[0]))
             if is_better is (number > 0):  # not its fault; or all that it may move
                 break
             fewest = len(changes_of(comparisons)) + 1
@@ -166,7 +175,8 @@ def largest_equivalent(
     for name in dict.fromkeys(name for name, _ in kept[1]):
         theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
         least[name] = min(theirs), max(theirs) < 1.0
-    return output, EquivalentPaths(tuple(applied(*kept)), tuple(comparisons), tuple(changes), least, kept[0])
+    paths = tuple(applied(*kept))
+    return output, EquivalentPaths(paths, tuple(comparisons), tuple(changes), least, kept[0], mended)
 
 
 def _smaller(

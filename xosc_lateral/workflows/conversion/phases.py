@@ -154,16 +154,20 @@ class _Phases:
         return why_kept(self._plan.played.scenario, crossing.path, motion.name)
 
     def _to_aside(self, crossing: Crossing) -> OffsetPath:
-        """As written, but for its end: there the driver drives beside the middle; as long as without offsets."""
+        """As written, but for its end, where the driver drives beside the middle; nominally as long as without offsets.
+
+        A rate is in proportion to the way: so it lasts as long, and longer where a vehicle under test leads it farther.
+        """
         motion, row, last = self._entity.motion, crossing.last, self._crossed[crossing.path]
         aside, side = float(self._offset(np.array([last]))[0]), self._way.side_at(last)
         direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
         there = direction * float(motion.offset[row]) + side * aside
         dynamics = lane_changes_of(self._plan.played.scenario, motion.name)[crossing.path][1].dynamics
-        played = next(one for one in self._own if one.path == crossing.path)
-        is_rate = dynamics.dimension is DynamicsDimension.RATE and played.end is not None
-        duration = played.end - played.start if is_rate and played.end is not None else 0.0
-        return OffsetPath(motion.name, crossing.path, (), side, end=aside, instead=True, settles=(there, duration))
+        way, rate = float(crossing.way[-1]), 0.0
+        if dynamics.dimension is DynamicsDimension.RATE and abs(way) > LEAST_MOVE:
+            begin = float(self._offset(self._driven[[crossing.first]])[0])
+            rate = float(dynamics.value) * abs(way + aside - begin) / abs(way)
+        return OffsetPath(motion.name, crossing.path, (), side, end=aside, instead=True, settles=(there, rate))
 
     def _across(self, crossing: Crossing) -> OffsetPath:
         """By the distance driven; over when the written way is: the bell's last centimetres are left for later."""

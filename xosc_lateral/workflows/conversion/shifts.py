@@ -139,7 +139,7 @@ def compare_runs(
             what, first = _named(key, action), (*key[:2], 0) not in then
             how = NEW if first else "happens once more"
             changes.setdefault(what, Change(what, key[1], action.start, how))
-    others = [*_other_order(then, now), *_other_lanes(before, after, ignored)]
+    others = [*_other_order(then, now), *_other_lanes(network, before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
     touching = [
@@ -268,7 +268,8 @@ class _Shifts:
         ways = [self._way(entities, run) for entities, run in zip(self._entities, (then, now), strict=True)]
         if not powers or min(ways) < LEAST_WAY:
             return [0.0]
-        return [duration * ((ways[1] / ways[0]) ** power - 1.0) for power in powers]
+        slower = _stated_rate(then) / _stated_rate(now)
+        return [duration * ((ways[1] / ways[0]) ** power * slower - 1.0) for power in powers]
 
     def _way(self, entities: Mapping[str, EntityMotion], played: PlayedAction) -> float:
         """How far it leads across the road. [m]"""
@@ -283,6 +284,13 @@ class _Shifts:
             return 0.0
         t = self._network.offset_to_t(road, lane, s, entity.offset[rows])
         return float(abs(t[1] - t[0]))
+
+
+def _stated_rate(played: PlayedAction) -> float:
+    """Of a lane change that states one, 1 of others. [m/s]"""
+    content = played.action.content
+    is_rate = isinstance(content, LaneChangeAction) and content.dynamics.dimension is DynamicsDimension.RATE
+    return float(content.dynamics.value) if is_rate and content.dynamics.value > 0.0 else 1.0
 
 
 def _powers(played: PlayedAction) -> tuple[float, ...]:
@@ -324,19 +332,31 @@ def _other_end(shifts: _Shifts, before: NominalMotion, after: NominalMotion) -> 
         yield Change(what, None, before.end_time, f"comes {later(moved)}", moved)
 
 
-def _other_lanes(before: NominalMotion, after: NominalMotion, ignored: Collection[str]) -> Iterator[Change]:
-    lanes = {entity.name: _last_lanes(entity, after.end_time) for entity in before.entities}
+def _other_lanes(
+    network: RoadNetwork, before: NominalMotion, after: NominalMotion, ignored: Collection[str]
+) -> Iterator[Change]:
+    """Who ends in another lane, and not beside a marking that is as near to where it ended before."""
+    then = {entity.name: _last_places(entity, after.end_time, network) for entity in before.entities}
     for entity in after.entities:
-        last = _last_lanes(entity, before.end_time)
-        if entity.name not in ignored and not set(lanes.get(entity.name, last)) & set(last):
-            what = f"the last lane of '{entity.name}', {lanes[entity.name][-1]},"
-            yield Change(what, entity.name, before.end_time, f"is {last[-1]}")
+        lanes, road, t, _ = _last_places(entity, before.end_time, network)
+        were, on, was, width = then.get(entity.name, (lanes, road, t, 0.0))
+        is_apart = road != on or abs(t - was) > 0.5 * width
+        if entity.name not in ignored and is_apart and not set(were) & set(lanes):
+            yield Change(
+                f"the last lane of '{entity.name}', {were[-1]},", entity.name, before.end_time, f"is {lanes[-1]}"
+            )
 
 
-def _last_lanes(entity: EntityMotion, end: float) -> list[int]:
-    """Where both runs are still on: that in which it ends, after those that it has just left."""
-    rows = (entity.time <= end) & (entity.time >= min(end, float(entity.time[-1])) - EVENT_TOLERANCE)
-    return [int(lane) for lane in entity.lane[rows]] or [int(entity.lane[0])]
+def _last_places(entity: EntityMotion, end: float, network: RoadNetwork) -> tuple[list[int], int, float, float]:
+    """Where both runs are still on: the lane in which it ends, after those that it has just left; road, t and width."""
+    near = (entity.time <= end) & (entity.time >= min(end, float(entity.time[-1])) - EVENT_TOLERANCE)
+    rows = np.flatnonzero(near) if near.any() else np.zeros(1, dtype=np.int64)
+    road, lane, s = (int(entity.road[rows[-1]]), int(entity.lane[rows[-1]]), float(entity.s[rows[-1]]))
+    lanes, t, width = entity.lane[rows].tolist(), 0.0, 0.0
+    if road >= 0 and network.has_lane_at(road, lane, s):
+        t = float(network.offset_to_t(road, lane, s, float(entity.offset[rows[-1]])))
+        width = network.lane_state_at(road, lane, s).width
+    return lanes, road, t, width
 
 
 def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:

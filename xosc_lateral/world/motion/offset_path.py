@@ -84,7 +84,7 @@ class OffsetPath(Struct, frozen=True, eq=False):
     end: float = 0.0
     instead: bool = False  # it leads to another lane, in place of the action `after`
     # settles: it is led there first, from wherever it is: so far along +t from its lane's centre, within a way [m];
-    # with `instead` the action itself leads there, in a time [s], 0: in what it states
+    # with `instead` the action itself leads there, at a rate [m/s], 0: as it states
     settles: tuple[float, float] | None = None
     # over, unless: an action that it ends, since the entity is where that leads; none of those has begun before
     over: tuple[str, ...] | None = None

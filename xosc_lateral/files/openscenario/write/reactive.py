@@ -84,12 +84,10 @@ def _element_of(path: OffsetPath, draft: Draft) -> etree._Element:
 def _lead_across(change: etree._Element, name: str, path: OffsetPath, draft: Draft) -> None:
     """Event, action and trigger stay; the player moves it along the path, or as written to beside the middle."""
     if path.settles is not None:
-        aside, duration = path.settles
+        aside, rate = path.settles
         change.set("targetLaneOffset", build.decimal(aside, 4))
-        if duration > 0.0:  # by its rate it would last longer or shorter from, and to, beside the middle
-            dynamics = next(change.iter("{*}LaneChangeActionDynamics"))
-            dynamics.set("dynamicsDimension", "time")
-            dynamics.set("value", build.decimal(duration, 3))
+        if rate > 0.0:
+            next(change.iter("{*}LaneChangeActionDynamics")).set("value", build.decimal(rate, 4))
         return
     lateral = change.getparent()
     assert lateral is not None
