@@ -121,6 +121,20 @@ def test_esmini_plays_it_as_the_source(tmp_path: Path) -> None:
     assert "RoutingAction" in (tmp_path / "out.xosc").read_text() and not made.warnings
 
 
+def test_the_lane_of_who_stays_in_one_is_known_before(tmp_path: Path) -> None:
+    path = scenario(tmp_path, trigger=TRIGGER)
+    text = path.read_text().replace(
+        '<AbsoluteTargetLane value="-2"/>', '<RelativeTargetLane entityRef="Stays" value="0"/>'
+    )
+    stays = private("Stays", teleport("600", "-2"), speed_action("0"))
+    text = text.replace("</Entities>", f"{entity('Stays')}</Entities>").replace(
+        "</Actions></Init>", f"{stays}</Actions></Init>"
+    )
+    path.write_text(text)
+    made = xl.convert(path, tmp_path / "out.xosc", seed=2)
+    assert [line for line in made.notes if "lane change of 'A' at" in line and "is its driver's" in line]
+
+
 def test_a_lane_change_by_a_rate_keeps_it_in_proportion_to_its_way(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     text = path.read_text().replace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from enum import IntEnum
 
 from xosc_lateral.world.motion.nominal import NominalMotion
@@ -65,14 +65,14 @@ def why_untouched(scenario: Scenario, path: Path, actor: str) -> str:
     return ""
 
 
-def why_kept(scenario: Scenario, path: Path, actor: str) -> str:
+def why_kept(scenario: Scenario, path: Path, actor: str, keeping: Collection[str] = ()) -> str:
     """Why a path can't stand for a lane change; empty: it can.
 
-    Where it leads has to be known before.
+    Where it leads has to be known before: the lane of `keeping` is, who are in one all the time.
     """
     at, change = lane_changes_of(scenario, actor)[path]
     maneuver = next(one for one, event in at.group.events() if event is at.event)
-    if isinstance(change.target, RelativeTargetLane) and change.target.entity_ref != actor:
+    if isinstance(change.target, RelativeTargetLane) and change.target.entity_ref not in (actor, *keeping):
         return f"its lane is that of '{change.target.entity_ref}'"
     if any(event.priority is Priority.SKIP for event in maneuver.events if event is not at.event):
         return "an event beside it is skipped while it runs"

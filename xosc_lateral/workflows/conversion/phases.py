@@ -151,7 +151,9 @@ class _Phases:
             return "it is slow meanwhile"
         if ahead is not None and ahead.distance < self._driven[crossing.last] + END_MARGIN:
             return f"no path leads over what is ahead ({ahead.why})"
-        return why_kept(self._plan.played.scenario, crossing.path, motion.name)
+        entities = self._plan.extended.motion.entities
+        keeping = [one.name for one in entities if one.name not in self._plan.depends.entities and not np.ptp(one.lane)]
+        return why_kept(self._plan.played.scenario, crossing.path, motion.name, keeping)
 
     def _to_aside(self, crossing: Crossing) -> OffsetPath:
         """As written, but for its end, where the driver drives beside the middle; nominally as long as without offsets.
