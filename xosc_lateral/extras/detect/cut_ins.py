@@ -16,7 +16,7 @@ from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import View
-from xosc_lateral.extras.detect.scoring import Tally, cut_ins_of, plain
+from xosc_lateral.extras.detect.scoring import Tally, alarms_in_words, cut_ins_of, plain
 from xosc_lateral.extras.detect.sources import SourceSettings, converted, played_scene
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
 from xosc_lateral.extras.detect.vary import Variations, vary
@@ -32,7 +32,7 @@ FACTS = {"duration": "s", "gap": "m", "entry": "m/s", "end": "m"}
 """Of a cut-in, with units: from begin to end of its movement; free space to who is cut in on when its side is on the
 marking; how fast it moves sideways then; how far left of the middle of the new lane it ends."""
 SHARES = (0.05, 0.5, 0.95)
-DETECTOR_HEADINGS = ("detector", "seen", "before the marking", "time before it [s]", "false alarms / h")
+DETECTOR_HEADINGS = ("detector", "seen", "before the marking", "time before it [s]", "false alarms")
 
 
 def cut_ins_like(
@@ -146,7 +146,8 @@ class CutIns(Result):
             leads = rows["lead"].dropna().to_numpy()
             low, middle, high = np.quantile(leads, SHARES) if len(leads) else [np.nan] * 3
             hours = float(rows["lane_keeping"].sum()) / 3600.0
-            alarms = f"{rows['false_alarms'].sum() / hours:.1f}" if hours else "-"
+            count = int(rows["false_alarms"].sum())
+            alarms = alarms_in_words(count, hours, f"{count / hours:.1f}") if hours else "-"
             lead = f"{middle:.2f} ({low:.2f} to {high:.2f})" if len(leads) else "-"
             yield str(detector), f"{rows['seen'].mean():.0%}", f"{rows['seen_before_marking'].mean():.0%}", lead, alarms
 
