@@ -42,7 +42,7 @@ def _files(folder: Path) -> dict[Path, bytes]:
         ),
         ("convert", ["-o", "out.xosc", "--allow", "nowhere"], "nowhere: no such folder to allow"),
         ("convert", ["-o", "out.xosc", "--profile", "none.json"], "none.json: no such file"),
-        ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or directory"),
+        ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or folder"),
         ("states", ["-o", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
         ("states", ["-o", "out.xlsx"], "out.xlsx: can't write .xlsx: expected a name ending in .csv"),
         ("states", ["-o", "theirs.csv"], "theirs.csv: exists and was not written by xosc-lateral"),

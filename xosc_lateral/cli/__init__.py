@@ -19,6 +19,7 @@ from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.plugins import offered
 from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
+from xosc_lateral.cli.cures import cures
 from xosc_lateral.files.source import guarding_inputs
 
 VERBS = {
@@ -157,32 +158,6 @@ def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
     return {"error": {"kind": type(error).__name__, "message": " ".join(_in_words(error).split()), **place}}
 
 
-SIBLINGS = {
-    "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
-    "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
-    "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"), "verify": ("diff", "status"),
-    "profiles list": ("list", "profile", "library", "list-profiles"), "template write": ("new", "write-template"),
-    "template list": ("templates", "list-templates"), "convert SCENARIO... or FOLDER": ("convert-many",),
-    "import": ("import-drives", "read-drives"), "close-loop": ("loop", "identify", "refine", "plan-loop"),
-}  # fmt: skip
-"""Verb -> what others call it, Python's calls among them."""
-
-
-def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
-    """What to write in place of words that are wrong usage, where that can be told from them."""
-    first = next(iter(words), "")
-    later = next((word for word in words if word in VERBS), None)
-    if first.startswith("-") and later is not None:
-        yield f"options come after the verb: {later} ... {first}"
-    elif first not in VERBS and not first.startswith("-"):
-        name = first.replace("_", "-").lower()
-        yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
-    if "'--profile'" in wrong and "Missing" in wrong:
-        yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
-    if "not a valid float" in wrong:
-        yield "a number without its unit is expected, in the one that the option's help names: s, m, m/s, Hz"
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 128 + a signal."""
     words = sys.argv[1:] if argv is None else list(argv)
@@ -194,7 +169,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            line = in_terminal(f"xosc-lateral: {' '.join(_in_words(error).split())}")
+            line = "; ".join([_in_words(error), *cures(words)])
+            line = in_terminal(f"xosc-lateral: {' '.join(line.split())}")
             if "--log-json" in words:
                 line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
             print(line, file=sys.stderr)
@@ -213,7 +189,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         usage = cast(Any, error)
         usage.show()
-        for cure in _cures(words, str(usage.format_message())):
+        for cure in cures(words, usage):
             print(in_terminal(f"xosc-lateral: {cure}"), file=sys.stderr)
         code = usage.exit_code
     if argv is None:

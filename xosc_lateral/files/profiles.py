@@ -58,7 +58,7 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         return offered
     known = sorted({path.stem for path in list_profiles(folders)})
     error = DriverProfileError(
-        f"no profile {text!r}{did_you_mean(text, known)}; known are {', '.join(known) or 'none'}, "
+        f"no profile {text!r}{did_you_mean(text, [path.name for path in Path().glob(f'{text}*')] + known)}; known are {', '.join(known) or 'none'}, "
         "or give the path of a file"
     )
     error.unknown = text

@@ -15,7 +15,7 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
-from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, worst_of
+from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, time_in_words, worst_of
 from xosc_lateral.extras.detect.sources import Source
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
 from xosc_lateral.files.source import parsed_hashes
@@ -71,7 +71,8 @@ class Detection(Result):
         """See `Result`."""
         detectors = len({curve.detector.title() for curve in self.curves})
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        what = f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+        sources = "1 source" if len(self.origins) == 1 else f"{len(self.origins)} sources"
+        what = f"{detectors} detectors on {sources}, {time_in_words(hours)} of lane keeping"
         return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
 
     @property
@@ -105,7 +106,7 @@ class Detection(Result):
             lines += [f"{missed}." for missed in not_met(self.carriers)]
         hours = {curve.source: float(curve.hours.sum()) for curve in self.curves}
         hours |= {one.home.source: one.home.hours for one in self.carriers}
-        if few := [f"{source} ({time:.2f} h)" for source, time in hours.items() if time < 1.0]:
+        if few := [f"{source} ({time_in_words(time)})" for source, time in hours.items() if time < 1.0]:
             lines.append(
                 f"Less than an hour of lane keeping, so that rates are rough, and none is made of less than "
                 f"{60.0 * LEAST_HOURS:.0f} min: {', '.join(few)}."

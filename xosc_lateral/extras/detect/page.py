@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words
+from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words, time_in_words
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack
 from xosc_lateral.files.pages.chart import ENRICHED, color_of
 from xosc_lateral.files.pages.figure import Figure
@@ -32,7 +32,6 @@ def detection_page(
     telling = _telling(curves)
     page.lead(*([finding(telling)] if telling else []), lead[0])
     if telling:
-        page.section("Finding")
         page.figure(
             alarms_figure(telling),
             f"False alarms an hour over the threshold; none at all is drawn at {LEAST_RATE:g}. The dot is the one that "
@@ -42,7 +41,9 @@ def detection_page(
     page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
     page.text(*lead[1:])
     page.section(
-        "Curves", "From left to right, thresholds become more sensitive. The dot is the threshold that is set."
+        "Curves",
+        "From left to right, thresholds become more sensitive. The dot is the threshold that is set.",
+        folded=True,
     )
     page.figure(curves_figure(curves), "Cut-ins seen before the marking is crossed, and how long before")
     page.section("Worst cases")
@@ -86,15 +87,17 @@ def _rate(curve: Curve) -> float:
 def finding(curves: Sequence[Curve]) -> str:
     """What one detector does on the sources where it alarms least and most, in a sentence."""
     fewest, most = min(curves, key=_rate), max(curves, key=_rate)
-    rates = [f"{_alarms(most)} on {most.source}"]
-    if most is not fewest:
-        rates.append(f"{_alarms(fewest)} on {fewest.source}")
+    rates = [f"{_alarms(curve)} on {curve.source}" for curve in dict.fromkeys((most, fewest))]
+    alarms = f"raises false alarms: {', '.join(rates)}"
+    if not _rate(most):
+        hours = sum(float(curve.hours.sum()) for curve in curves)
+        alarms = f"raises no false alarm in {time_in_words(hours)} of lane keeping"
     shares = [100.0 * float(curve.in_time[curve.detector.chosen]) for curve in curves if len(curve.leads)]
     cut_ins = sum(len(curve.leads) for curve in curves)
     low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))
     seen = f"{low} %" if low == high else f"{low} to {high} %, by source,"
     before = f"; it sees {seen} of {cut_ins} cut-ins before the marking" if shares else ""
-    return f"{curves[0].detector.label()} raises false alarms: {', '.join(rates)}{before}."
+    return f"{curves[0].detector.label()} {alarms}{before}."
 
 
 def _alarms(curve: Curve) -> str:

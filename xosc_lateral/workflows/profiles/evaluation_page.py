@@ -61,6 +61,38 @@ def spectrum_figure(scores: ProfileScores) -> Figure:
     return figure
 
 
+def verdict_figure(verdict: spectra.Verdict) -> Figure:
+    """Ratios of powers over frequency, with intervals: of the driver, and of the recording."""
+    figure = Figure(1, 2, height=130.0, share_x="all", share_y="all")
+    powers = [ratio for ratio in verdict.ratios if ratio.high]
+    ends = min(ratio.low for ratio in powers), max(ratio.high for ratio in powers)
+    like = 1.0 / spectra.TOLERANCE, spectra.TOLERANCE
+    for panel, of, color in zip(figure.panels, spectra.BOTH, (SAMPLED, MEASURED), strict=True):
+        panel.title, panel.x.label, panel.x.log, panel.y.log = of, "frequency [Hz]", True, True
+        panel.x.limits = ends
+        panel.area((*ends, *ends[::-1]), (like[0], like[0], like[1], like[1]), color, opacity=0.12)
+        panel.line(ends, (1.0, 1.0), color, width=0.8, dashes="3 2")
+        for each in (ratio for ratio in powers if ratio.of == of):
+            middle = (each.low * each.high) ** 0.5
+            panel.line((middle, middle), each.interval, color)
+            panel.dots((middle,), (each.ratio,), color, size=6.0, label=f"{each.name}, {each.judged}")
+    figure.panels[0].y.label = "sampled over measured"
+    return figure
+
+
+_SURE = {
+    spectra.ALIKE: "moves as other real drivers do", spectra.UNLIKE: "does not move as other real drivers do",
+    spectra.NOT_KNOWN: "may or may not move as other real drivers do: these drives are too few to tell",
+}  # fmt: skip
+
+
+def finding(scores: ProfileScores) -> str:
+    """The verdict in a sentence, and the comparison that does worst."""
+    worst, ratio = worst_block(scores)
+    far = f"; farthest from them, {ratio:.2f} times as far as they are from each other: {worst}"
+    return f"`{scores.profile}` {_SURE[judged(scores, spectra.DRIVER)]}{far}."
+
+
 NAMED_BLOCKS = 3
 """Blocks that a verdict names."""
 GOOD_RATIO, BAD_RATIO = 1.2, 2.0
@@ -71,13 +103,12 @@ Block = tuple[float, float, float, str]
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """A table for the terminal."""
-    block, ratio = worst_block(scores)
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
         *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
+        finding(scores).replace("`", ""),
         f"verdict: {verdict_in_words(scores)}",
         scores.verdict.alarm_words(),
-        f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
         *realism_lines(scores.realism),
         "snippets as in the paper, from the same start; real drivers are compared without a common start",
         *_snippet_lines(scores.snippets),
@@ -117,9 +148,8 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
     page = Page(f"Evaluation of {scores.profile}")
-    verdict = verdict_in_words(scores)
     page.lead(
-        f"{verdict[:1].upper()}{verdict[1:]}. {scores.verdict.alarm_words().capitalize()}.",
+        finding(scores),
         f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), beside offsets sampled from "
         f"`{scores.profile}` under the same context. It is valid for: {profile.validity.in_words() or 'not stated'}.",
     )
@@ -130,7 +160,14 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
         page.warning(FITTED_NOTE)
-    _add_realism(page, scores.realism)
+    if any(ratio.high for ratio in scores.verdict.ratios):
+        page.figure(
+            verdict_figure(scores.verdict),
+            "Power of what is sampled over what is measured, by frequency; lines: 95 % intervals over drives. Shaded: "
+            "as far as real drivers differ from run to run. Driver: without the recording's sensor; recording: with it.",
+            "Sampled over measured power by frequency, of the driver and of the recording",
+        )
+    page.text(f"{scores.verdict.alarm_words().capitalize()}.")
     page.section("Traces")
     page.figure(
         trace_figure(scores),
@@ -138,10 +175,12 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "meant to coincide: two drives of the same driver do not either. What should agree is how they move.",
         "Measured and sampled offsets over time, drive by drive",
     )
+    _add_realism(page, scores.realism)
     page.section(
         f"Ten metrics of {scores.snippets.seconds:g} s snippets",
         "As in the paper: sampled from the same start; real drivers are compared without a common start. "
         f"{start_fade_note(profile)}",
+        folded=True,
     )
     _add_metrics(page, scores.snippets)
     _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
@@ -149,6 +188,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         page.section(
             f"Snippets of {scores.long_snippets.seconds:g} s",
             "The same metrics of longer snippets, which show slow movement.",
+            folded=True,
         )
         _add_metrics(page, scores.long_snippets)
     page.section(
@@ -156,6 +196,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Which part of the model falls short? The coarse and fine parts of measured snippets (split as in Neis and "
         "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
         "the measured fine part, shifted in time: the best that the split allows.",
+        folded=True,
     )
     page.table(
         [
@@ -167,7 +208,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
     )
     for each in scores.evaluations[:3]:
         _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
-    page.section("Spectrum and autocorrelation")
+    page.section("Spectrum and autocorrelation", folded=True)
     page.figure(
         spectrum_figure(scores),
         "Left: power spectral density of the offset. Right: autocorrelation about the mean over all drivers.",
@@ -177,6 +218,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Near the markings",
         f"How often the reference point comes within {NEAR_MARKING:g} m of a marking (half the width of a car, and a "
         "margin).",
+        folded=True,
     )
     page.table(
         [
@@ -203,10 +245,11 @@ def _add_realism(page: Page, realism: Realism) -> None:
         "snippets has an AUC of 0.5; in brackets, the 95 % interval over resampled drives. With context, it also sees "
         "what was around the vehicle; a column that follows from the vehicle's own movement, such as its steering "
         "angle, gives sampled movement away.",
+        folded=True,
     )
     for heading, group in condition_groups(realism).items():
         page.table(ratio_rows(group), heading)
-    page.section("Lane keeping")
+    page.section("Lane keeping", folded=True)
     formats = {"measured": ".4g", "sampled": ".4g", "distance [sd]": ".3f", "real drivers [sd]": ".3f"}
     for each in realism.conditions:
         if not each.condition.same_start:
@@ -265,7 +308,7 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
     for each in (slow, free):
         if each is not None and each.alone is not None:
             what = ", with the sensor" if each.with_sensor else ""
-            figures.append(KeyFigure(f"{each.alone.auc:.2f}", "classifier AUC", f"{each.condition.name}{what}"))
+            figures.append(KeyFigure(f"{each.alone.auc:.2f}", "classifier AUC", f"{each.condition.name}{what}; 0.5 is chance"))
     return figures
 
 

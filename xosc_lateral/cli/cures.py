@@ -1,0 +1,49 @@
+"""Mistakes of a command line, and what to write instead, as far as that can be told from its words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+from xosc_lateral.base.errors import meant_for
+
+SIBLINGS = {
+    "-h": ("help", "usage"), "--version": ("version",),
+    "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
+    "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
+    "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"), "verify": ("diff", "status"),
+    "profiles list": ("list", "library", "list-profiles"), "template write": ("new", "write-template"),
+    "template list": ("templates", "list-templates"), "convert SCENARIO... or FOLDER": ("convert-many",),
+    "import": ("import-drives", "read-drives"), "close-loop": ("loop", "identify", "refine", "plan-loop"),
+}  # fmt: skip
+"""Verb -> what others call it, Python's calls among them."""
+
+PYTHON = ("None", "True", "False")
+
+
+def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
+    """What to write in place of words; `usage`: typer's error, where they are wrong usage."""
+    for before, word in pairwise(words):
+        name, equals, value = word.partition("=")
+        if equals and name.isidentifier() and not before.startswith("-"):
+            yield f"{word!r} stands alone: options are written --{name.replace('_', '-')} {value}, before each value"
+        if word in PYTHON or value in PYTHON:
+            yield f"{value or word} is a word of Python: leave an option out that is not wanted, a switch has no value"
+    if usage is None:
+        return
+    first, context = next(iter(words), ""), getattr(usage, "ctx", None)
+    verbs = getattr(getattr(context, "command", None), "commands", {})
+    later = next((word for word in words if word in verbs), None)
+    if first.startswith("-") and later is not None:
+        yield f"options come after the verb: {later} ... {first}"
+    elif verbs:
+        name = next((word for word in words if word not in context.command_path.split()), "").lower().replace("_", "-")
+        same = [verb for verb, others in SIBLINGS.items() if context.parent is None and name in others]
+        yield f"{same[0]!r} does that" if same else f"{context.command_path} has {', '.join(verbs)}{meant_for(name)}"
+    parameter = getattr(usage, "param", None)
+    if said := getattr(parameter, "help", None):
+        yield f"{' '.join(parameter.opts)}: {said}"
+    if context is not None and not verbs:
+        _, _, examples = (context.command.epilog or "").partition("Examples:\n")
+        yield f"as in {examples.partition(chr(10))[0].strip()}"
