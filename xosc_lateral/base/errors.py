@@ -106,16 +106,19 @@ def meant_for(path: object) -> str:
     return f" ({name} is {kinds[0]})" if kinds else ""
 
 
-def absent(path: object) -> str:
-    """What is said of a file or folder that is not there, with the one beside it that may be meant."""
+def names_beside(path: object) -> list[str]:
+    """What lies in a path's folder; nothing where there is no such folder."""
     from pathlib import Path
 
-    place = Path(str(path))
     try:
-        beside = [other.name for other in place.parent.iterdir()]
-    except (OSError, ValueError):  # no such folder either, or a zero byte in the name
-        beside = []
-    return f"no such file or folder{did_you_mean(place.name, beside)}"
+        return [other.name for other in Path(str(path)).parent.iterdir()]
+    except (OSError, ValueError):  # a zero byte in the name
+        return []
+
+
+def absent(path: object) -> str:
+    """What is said of a file or folder that is not there, with the one beside it that may be meant."""
+    return f"no such file or folder{did_you_mean(str(path).rpartition('/')[2], names_beside(path))}"
 
 
 def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:

@@ -32,7 +32,8 @@ def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
             yield f"{value or word} is a word of Python: leave an option out that is not wanted, a switch has no value"
     if usage is None:
         return
-    first, context = next(iter(words), ""), getattr(usage, "ctx", None)
+    first = next(iter(words), "")
+    context: Any = getattr(usage, "ctx", None)
     verbs = getattr(getattr(context, "command", None), "commands", {})
     later = next((word for word in words if word in verbs), None)
     if first.startswith("-") and later is not None:
@@ -41,7 +42,7 @@ def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
         name = next((word for word in words if word not in context.command_path.split()), "").lower().replace("_", "-")
         same = [verb for verb, others in SIBLINGS.items() if context.parent is None and name in others]
         yield f"{same[0]!r} does that" if same else f"{context.command_path} has {', '.join(verbs)}{meant_for(name)}"
-    parameter = getattr(usage, "param", None)
+    parameter: Any = getattr(usage, "param", None)
     if said := getattr(parameter, "help", None):
         yield f"{' '.join(parameter.opts)}: {said}"
     if context is not None and not verbs:

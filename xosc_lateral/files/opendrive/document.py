@@ -91,7 +91,8 @@ def plain_root(root: XmlElement, path: str) -> XmlElement:
         for element in root.iter(etree.Element):
             element.tag = element.tag.rpartition("}")[2]
     if root.tag != "OpenDRIVE":
-        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'{meant_for('.xosc') if root.tag == 'OpenSCENARIO' else ''}", path=path, line=line_of(root))
+        hint = meant_for(".xosc") if root.tag == "OpenSCENARIO" else ""
+        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'{hint}", path=path, line=line_of(root))
     return root
 
 

@@ -213,7 +213,8 @@ class Page:
 
 PLAYER_KEYS = (
     '<details class="keys"><summary>Keys</summary><p>Space: play or pause. ← →: 0.1 s back or on, with Shift 1 s. '
-    "↑ ↓: lateral stretch. + −: zoom. F: follow the next vehicle. 0: show everything. Home, End: start and end. In a "
+    "↑ ↓: lateral stretch; 1: true proportions. &lt; &gt;: slower, faster. + −: zoom. F: follow the next vehicle. "
+    "0: show everything. Home, End: start and end. In a "
     "figure over time: click to take the player to that time.</p></details>"
 )
 

@@ -18,7 +18,7 @@ from xosc_lateral.drivers.evaluation.snippets import PartEvaluation
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.pages.page import Page, Tone
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.realism_text import (
     FAMILY_LABELS,
@@ -124,11 +124,10 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         for each in scores.evaluations
     ]
     lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
-    for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
-        lines.append(
-            f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, offsets up to "
-            f"{each.largest:.2f} m"
-        )
+    lines += [
+        f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, up to {each.largest:.2f} m"
+        for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+    ]
     return "\n".join(lines)
 
 
@@ -153,21 +152,17 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), beside offsets sampled from "
         f"`{scores.profile}` under the same context. It is valid for: {profile.validity.in_words() or 'not stated'}.",
     )
-    worst, ratio = worst_block(scores)
-    worst_figure = KeyFigure(
-        f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
-    )
-    page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
         page.warning(FITTED_NOTE)
     if any(ratio.high for ratio in scores.verdict.ratios):
         page.figure(
             verdict_figure(scores.verdict),
             "Power of what is sampled over what is measured, by frequency; lines: 95 % intervals over drives. Shaded: "
-            "as far as real drivers differ from run to run. Driver: without the recording's sensor; recording: with it.",
+            "as far as real drivers differ from run to run. Driver: without the sensor's error; recording: with it.",
             "Sampled over measured power by frequency, of the driver and of the recording",
         )
-    page.text(f"{scores.verdict.alarm_words().capitalize()}.")
+    words = verdict_in_words(scores)
+    page.text(f"{words[:1].upper()}{words[1:]}.", f"{scores.verdict.alarm_words().capitalize()}.")
     page.section("Traces")
     page.figure(
         trace_figure(scores),
@@ -206,8 +201,6 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
             for each in scores.evaluations
         ]
     )
-    for each in scores.evaluations[:3]:
-        _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
     page.section("Spectrum and autocorrelation", folded=True)
     page.figure(
         spectrum_figure(scores),
@@ -293,23 +286,6 @@ def _snippet_lines(scores: SnippetScores) -> list[str]:
         f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio",
         *(f"  {name:24s}  {each:8.3f}  {real:12.3f}  {each / real:5.2f}" for name, each, real in _metric_rows(scores)),
     ]
-
-
-def _key_figures(realism: Realism) -> list[KeyFigure]:
-    """Of the shortest free runs: how near, how well separated."""
-    figures = []
-    slow = next((each for each in realism.conditions if each.condition.slow), None)
-    free = next(
-        (each for each in realism.conditions if not each.condition.slow and not each.condition.same_start), None
-    )
-    if slow is not None:
-        ratio = slow.families["metrics"].ratio
-        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / real drivers", slow.condition.name, _tone(ratio)))
-    for each in (slow, free):
-        if each is not None and each.alone is not None:
-            what = ", with the sensor" if each.with_sensor else ""
-            figures.append(KeyFigure(f"{each.alone.auc:.2f}", "classifier AUC", f"{each.condition.name}{what}; 0.5 is chance"))
-    return figures
 
 
 def blocks_of(scores: ProfileScores) -> dict[str, Block]:

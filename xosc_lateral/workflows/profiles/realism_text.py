@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
 from xosc_lateral.drivers.model.core.base import ModelKind
@@ -60,40 +61,34 @@ def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
 
 def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     """A row for each family and each classifier, a column for each length."""
-    rows: list[dict[str, object]] = []
-    for family, label in FAMILY_LABELS.items():
-        if any(family in each.families for each in group):
-            cells = {
-                _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
-            }
-            rows.append({"ratio to real drivers": label, **cells})
-    for key, label in AREA_LABELS.items():
-        areas = {_length(each): getattr(each, key) for each in group}
-        if any(area is not None for area in areas.values()):
-            cells = {
-                length: "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
-                for length, area in areas.items()
-            }
-            rows.append({"ratio to real drivers": label, **cells})
-    return rows
+    families = {
+        label: {
+            _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
+        }
+        for family, label in FAMILY_LABELS.items()
+    }
+    areas = {label: {_length(each): _area(getattr(each, key)) for each in group} for key, label in AREA_LABELS.items()}
+    return [
+        {"ratio to real drivers": label, **cells} for label, cells in (families | areas).items() if any(cells.values())
+    ]
+
+
+def _area(area: TwoSampleResult | None) -> str:
+    return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
 
 
 def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
     """A row for each lane-keeping indicator: means, distance, that between real drivers."""
-    rows: list[dict[str, object]] = []
-    for name in INDICATORS:
-        real, sampled = scores.means[name]
-        beside = scores.named[name]
-        rows.append(
-            {
-                "indicator": INDICATOR_LABELS[name],
-                "measured": real,
-                "sampled": sampled,
-                "distance [sd]": beside.value,
-                "real drivers [sd]": beside.floor,
-            }
-        )
-    return rows
+    return [
+        {
+            "indicator": INDICATOR_LABELS[name],
+            "measured": scores.means[name][0],
+            "sampled": scores.means[name][1],
+            "distance [sd]": scores.named[name].value,
+            "real drivers [sd]": scores.named[name].floor,
+        }
+        for name in INDICATORS
+    ]
 
 
 def realism_lines(realism: Realism) -> list[str]:
