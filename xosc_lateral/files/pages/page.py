@@ -71,15 +71,6 @@ class Html(str):
     __slots__ = ()
 
 
-class Group(NamedTuple):
-    """What several things have in common."""
-
-    number: int
-    what: str
-    members: Sequence[str]  # A line each; folded away until somebody asks.
-    tone: Tone = ""
-
-
 class Page:
     """A page in the making."""
 
@@ -127,13 +118,12 @@ class Page:
         points = _points(lines)
         self._main += [f"<ul>{points}</ul>"] if points else []
 
-    def groups(self, groups: Iterable[Group]) -> None:
-        """Add groups, each a line with its number that unfolds into its members."""
-        self._main += [
-            f'<details class="{" ".join(filter(None, ("group", one.tone)))}"><summary><b>{one.number}</b> '
-            f"{inline(one.what)}</summary><ul>{_points(one.members)}</ul></details>"
-            for one in groups
-        ]
+    def group(self, number: int, what: str, members: Iterable[str], tone: Tone = "") -> None:
+        """Add what so many have in common: a line that unfolds into them."""
+        self._main.append(
+            f'<details class="{" ".join(filter(None, ("group", tone)))}"><summary><b>{number}</b> '
+            f"{inline(what)}</summary><ul>{_points(members)}</ul></details>"
+        )
 
     def figure(self, figure: Figure, caption: str, alt: str = "", *, over_time: bool = False) -> None:
         """Add a figure with a caption; `alt`: for those who can't see it; `over_time`: x is the player's time."""

@@ -81,7 +81,7 @@ class PictureScene:
                 ghost = np.vstack([around, around[:1]])
                 panel.line(ghost[:, 0], ghost[:, 1], INK, width=1.0, dashes="3 2", label="without offsets")
         low = -0.9 * across
-        panel.line((20.0 - REACH, -REACH), (low, low), INK, label=f"20 m, {wider:.1f} times as wide as it is")
+        panel.line((20.0 - REACH, -REACH), (low, low), INK, label=f"20 m; across {wider:.1f} times as large")
         return figure
 
     def _draw_road(self, panel: Panel, camera: tuple[float, float, float]) -> None:
@@ -205,21 +205,13 @@ def write_animation(
             f"an animation of {shown.end_time:.0f} s: at most {MOST_PICTURES * GIF_STEP:.0f} s; --time-limit"
         )
     images = list(rasters(map(shown.picture, times)))
-    size = images[0].width, max(one.height for one in images)
-    from PIL import Image
+    from PIL import Image, ImageOps
 
-    frames = []
-    for image in images:  # legends may have more or fewer rows
-        frame = Image.new("RGB", size, "white")
-        frame.paste(image, (0, size[1] - image.height))
-        frames.append(frame.quantize(64, dither=Image.Dither.NONE))
-    data = BytesIO()
-    more = {
-        "save_all": True,
-        "append_images": frames[1:],
-        "duration": round(1000 * GIF_STEP),
-        "loop": 0,
-        "comment": PACKAGE,
-    }
-    frames[0].save(data, "GIF", **more)
+    high = max(image.height for image in images)  # legends may have more or fewer rows
+    frames = [
+        ImageOps.expand(image, (0, high - image.height, 0, 0), "white").quantize(64, dither=Image.Dither.NONE)
+        for image in images
+    ]
+    data, step = BytesIO(), round(1000 * GIF_STEP)
+    frames[0].save(data, "GIF", save_all=True, append_images=frames[1:], duration=step, loop=0, comment=PACKAGE)
     return write_atomically(output, data.getvalue())

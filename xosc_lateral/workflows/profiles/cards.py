@@ -42,10 +42,11 @@ def list_text(entries: Sequence[Entry]) -> str:
     width = max((len(entry.name) for entry in entries if entry.profile is not None), default=0)
     lines = [_list_line(entry.name, entry.profile, width) for entry in entries if entry.profile is not None]
     lines += [f"! {entry.problem}" for entry in entries if entry.problem]
-    for entry in entries:
-        if entry.hidden_by is not None:
-            shipped = "the shipped profile" if entry.is_shipped else str(entry.path)
-            lines.append(f"! {entry.hidden_by} hides {shipped} {entry.name!r}")
+    lines += [
+        f"! {entry.hidden_by} hides {'the shipped profile' if entry.is_shipped else entry.path} {entry.name!r}"
+        for entry in entries
+        if entry.hidden_by is not None
+    ]
     return "\n".join(lines) or "no profiles"
 
 

@@ -14,11 +14,10 @@ from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.realism import Realism
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores, scores_to_dict
-from xosc_lateral.drivers.evaluation.snippets import PartEvaluation
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.files.pages.page import Page, Tone
+from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.realism_text import (
     FAMILY_LABELS,
@@ -95,40 +94,40 @@ def finding(scores: ProfileScores) -> str:
 
 NAMED_BLOCKS = 3
 """Blocks that a verdict names."""
-GOOD_RATIO, BAD_RATIO = 1.2, 2.0
-"""Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
 Block = tuple[float, float, float, str]
 """A ratio to what other real drivers get, its 95 % interval, and of what it speaks: driver or recording."""
 
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """A table for the terminal."""
-    lines = [
-        f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
-        *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
-        finding(scores).replace("`", ""),
-        f"verdict: {verdict_in_words(scores)}",
-        scores.verdict.alarm_words(),
-        *realism_lines(scores.realism),
-        "snippets as in the paper, from the same start; real drivers are compared without a common start",
-        *_snippet_lines(scores.snippets),
-    ]
-    if note := start_fade_note(profile):
-        lines.append(f"  {note}")
-    if scores.long_snippets is not None:
-        lines += _snippet_lines(scores.long_snippets)
-    lines.append("mean distance of the four evaluations (coarse + fine):")
-    lines += [
-        f"  ({each.number}) {each.coarse} + {each.fine}: {each.distances.mean:.3f}, worst {each.distances.worst} "
-        f"{each.distances.by_metric[each.distances.worst]:.3f}"
-        for each in scores.evaluations
-    ]
-    lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
-    lines += [
-        f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, up to {each.largest:.2f} m"
-        for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
-    ]
-    return "\n".join(lines)
+    note, long = start_fade_note(profile), scores.long_snippets
+    return "\n".join(
+        [
+            f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), "
+            f"seed {scores.seed}",
+            *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
+            finding(scores).replace("`", ""),
+            f"verdict: {verdict_in_words(scores)}",
+            scores.verdict.alarm_words(),
+            *realism_lines(scores.realism),
+            "snippets as in the paper, from the same start; real drivers are compared without a common start",
+            *_snippet_lines(scores.snippets),
+            *([f"  {note}"] if note else []),
+            *([] if long is None else _snippet_lines(long)),
+            "mean distance of the four evaluations (coarse + fine):",
+            *(
+                f"  ({each.number}) {each.coarse} + {each.fine}: {each.distances.mean:.3f}, worst "
+                f"{each.distances.worst} {each.distances.by_metric[each.distances.worst]:.3f}"
+                for each in scores.evaluations
+            ),
+            f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)",
+            *(
+                f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, "
+                f"up to {each.largest:.2f} m"
+                for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+            ),
+        ]
+    )
 
 
 FITTED_NOTE = (
@@ -178,7 +177,12 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         folded=True,
     )
     _add_metrics(page, scores.snippets)
-    _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
+    made = scores.evaluations[3]
+    page.figure(
+        violin_figure(made.real, made.artificial),
+        "Measured (left, blue) beside sampled (right) snippets. Bars: minimum, mean, maximum.",
+        f"Ten pairs of violins; mean distance {made.distances.mean:.3f}.",
+    )
     if scores.long_snippets is not None:
         page.section(
             f"Snippets of {scores.long_snippets.seconds:g} s",
@@ -257,14 +261,6 @@ def _add_realism(page: Page, realism: Realism) -> None:
     )
 
 
-def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
-    page.figure(
-        violin_figure(each.real, each.artificial),
-        f"{caption} Bars: minimum, mean, maximum.",
-        f"Ten pairs of violins; mean distance {each.distances.mean:.3f}.",
-    )
-
-
 def _metric_rows(scores: SnippetScores) -> list[tuple[str, float, float]]:
     """Each metric and their mean: name, distance, and that between real drivers, in standard deviations."""
     rows = [(METRIC_WORDS[name], scores.distances.by_metric[name], scores.floor.by_metric[name]) for name in METRICS]
@@ -277,7 +273,6 @@ def _add_metrics(page: Page, scores: SnippetScores) -> None:
         [{"metric": name, "distance": each, "real drivers": real, "ratio": each / real} for name, each, real in rows],
         f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
         formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
-        tones={number: _tone(each / real) for number, (_, each, real) in enumerate(rows[:-1])},
     )
 
 
@@ -324,23 +319,16 @@ def verdict_in_words(scores: ProfileScores) -> str:
     far = far_blocks(scores)
     if not far:
         return scores.verdict.in_words()
-    listed = ", ".join(
-        f"{name} {ratio:.2f} ({low:.2f} to {high:.2f}, {of})"
-        for name, (ratio, low, high, of) in list(far.items())[:NAMED_BLOCKS]
-    )
+    listed = [f"{name} {ratio:.2f} ({low:.2f} to {high:.2f}, {of})" for name, (ratio, low, high, of) in far.items()]
     more = f" and {len(far) - NAMED_BLOCKS} more" if len(far) > NAMED_BLOCKS else ""
     what = "farther from real drivers than these are from each other in"
-    return f"{scores.verdict.in_words()}; not like them: {what} {listed}{more}"
+    return f"{scores.verdict.in_words()}; not like them: {what} {', '.join(listed[:NAMED_BLOCKS])}{more}"
 
 
 def judged(scores: ProfileScores, of: str) -> str:
     """Driver or recording: alike, unlike or not known, by ratios and blocks."""
     contradicted = any(block[3] == of for block in far_blocks(scores).values())
     return spectra.UNLIKE if contradicted else scores.verdict.judged(of)
-
-
-def _tone(ratio: float) -> Tone:
-    return "good" if ratio <= GOOD_RATIO else "bad" if ratio >= BAD_RATIO else ""
 
 
 def _fitted_on(profile: DriverProfile, inputs: Mapping[str, str]) -> bool:

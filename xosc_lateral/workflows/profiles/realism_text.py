@@ -99,20 +99,20 @@ def realism_lines(realism: Realism) -> list[str]:
         for row in ratio_rows(group):
             label, *cells = row.values()
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
-    if all(each.alone is None for each in realism.conditions):
-        lines.append("    classifier AUC: not computed")
+    lines += ["    classifier AUC: not computed"] * all(each.alone is None for each in realism.conditions)
     shown = next((each for each in realism.conditions if not each.condition.same_start), None)
     if shown is not None:
         lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
-        for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown)):
-            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}")
-    before, made = realism.variance_real, realism.variance_sampled
-    lines.append(
-        f"variance between drivers, within drivers, inside snippets [m²]: "
-        f"measured {before.between:.4f}, {before.within:.4f}, {before.inside:.4f}; "
-        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
+        lines += [
+            f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}"
+            for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown))
+        ]
+    measured, sampled = (
+        f"{each.between:.4f}, {each.within:.4f}, {each.inside:.4f}"
+        for each in (realism.variance_real, realism.variance_sampled)
     )
-    return lines
+    what = "variance between drivers, within drivers, inside snippets [m²]"
+    return [*lines, f"{what}: measured {measured}; sampled {sampled}"]
 
 
 def _length(each: ConditionScores) -> str:
