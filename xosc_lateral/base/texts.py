@@ -28,3 +28,8 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows of a table as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def counted(number: int, thing: str) -> str:
+    """``1 segment``, ``2 segments``."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"

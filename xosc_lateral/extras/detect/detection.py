@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.texts import aligned
+from xosc_lateral.base.texts import aligned, counted
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
 from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, time_in_words, worst_of
@@ -71,8 +71,8 @@ class Detection(Result):
         """See `Result`."""
         detectors = len({curve.detector.title() for curve in self.curves})
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        sources = "1 source" if len(self.origins) == 1 else f"{len(self.origins)} sources"
-        what = f"{detectors} detectors on {sources}, {time_in_words(hours)} of lane keeping"
+        both = f"{counted(detectors, 'detector')} on {counted(len(self.origins), 'source')}"
+        what = f"{both}, {time_in_words(hours)} of lane keeping"
         return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
 
     @property

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from xosc_lateral.base.texts import counted
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.jobs import Batch
@@ -39,10 +40,10 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
     contacts = [row for row in rows if has_new_contact(row)]
     in_trials = [row for row in rows if row.trial_contacts and not row.error and row not in contacts]
     warned = by_cause((row, warning) for row in rows if not row.error for warning in row.warnings)
-    lost, causes = sum(bool(row.error) for row in rows), f"{len(failed)} cause{'s' if len(failed) != 1 else ''}"
+    lost = sum(bool(row.error) for row in rows)
     page = Page(f"Batch {name}")
     page.lead(
-        f"{lost} of {len(rows)} outputs could not be made, for {causes}."
+        f"{lost} of {len(rows)} outputs could not be made, for {counted(len(failed), 'cause')}."
         if lost
         else f"All {len(rows)} outputs are made.",
     )
