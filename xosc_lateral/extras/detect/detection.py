@@ -114,8 +114,8 @@ class Detection(Result):
         silent = sorted(self.still)
         if silent:
             lines.append(
-                f"{', '.join(silent)}: no vehicle moves inside its lane, so that there are no false alarms by "
-                "construction: that says nothing about a detector."
+                f"{', '.join(silent)}: no vehicle moves inside its lane, so that what watches movement raises no "
+                "false alarm by construction: that says nothing about a detector."
             )
         alone = [curve for curve in self.curves if curve.detector.needs_observer and not len(curve.hours)]
         left = sorted({f"{curve.detector.name} on {curve.source}" for curve in alone})

@@ -66,15 +66,17 @@ def detection_page(
 
 
 def _telling(curves: Sequence[Curve]) -> list[Curve]:
-    """Of the detector whose false alarms differ most between sources, or are most of all where there is one source."""
+    """Of the detector whose false alarms differ most between sources, or are most of all where there is one source;
+    one that sees cut-ins, if any does."""
     detectors: dict[str, list[Curve]] = {}
     for curve in curves:
         if curve.hours.sum() > 0.0:
             detectors.setdefault(curve.detector.label(), []).append(curve)
 
-    def spread(some: Sequence[Curve]) -> float:
+    def spread(some: Sequence[Curve]) -> tuple[bool, float]:
         rates = [_rate(curve) for curve in some]
-        return max(rates) - (min(rates) if len(rates) > 1 else 0.0)
+        sees = any(curve.in_time[curve.detector.chosen] > 0.0 for curve in some if len(curve.leads))
+        return sees, max(rates) - (min(rates) if len(rates) > 1 else 0.0)
 
     return max(detectors.values(), key=spread, default=[])
 
