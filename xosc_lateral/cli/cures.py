@@ -42,9 +42,7 @@ def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
         name = next((word for word in words if word not in context.command_path.split()), "").lower().replace("_", "-")
         same = [verb for verb, others in SIBLINGS.items() if context.parent is None and name in others]
         yield f"{same[0]!r} does that" if same else f"{context.command_path} has {', '.join(verbs)}{meant_for(name)}"
-    parameter: Any = getattr(usage, "param", None)
-    if said := getattr(parameter, "help", None):
-        yield f"{' '.join(parameter.opts)}: {said}"
+    if help_text := getattr(getattr(usage, "param", None), "help", None):
+        yield f"{' '.join(usage.param.opts)}: {help_text}"
     if context is not None and not verbs:
-        _, _, examples = (context.command.epilog or "").partition("Examples:\n")
-        yield f"as in {examples.partition(chr(10))[0].strip()}"
+        yield f"as in {(context.command.epilog or '').partition('Examples:')[2].strip().partition(chr(10))[0]}"

@@ -227,7 +227,7 @@ def position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]
 def _in_likely_unit(columns: Mapping[str, FloatArray], width: float) -> str:
     """Lanes' columns in the unit in which they would be nearest to usual ones; `width`: believed to be in m."""
     named = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
-    unit = min(UNIT_SIZES, key=lambda one: abs(np.log(max(width, 1e-9) / UNIT_SIZES[one] / np.mean(LANE_WIDTHS))))
+    unit = min(UNIT_SIZES, key=lambda name: abs(np.log(max(width, 1e-9) / UNIT_SIZES[name] / np.mean(LANE_WIDTHS))))
     return " ".join(f"{name}=COLUMN:{unit}" for name in named)
 
 

@@ -45,7 +45,7 @@ WANDER_RATE = 0.3  # nobody who keeps a lane moves sideways as fast half of the 
 USUAL_WIDTH = 1.8  # [m]
 FARTHEST_MEAN = 0.42  # two standard deviations of the mean offsets of 445 vehicles on a motorway: no traffic's mean [m]
 LEAST_VEHICLES = 5
-NEAR = 0.1  # of the standard deviation of an offset [-]
+NEAR_ZERO = 0.1  # of the standard deviation of an offset [-]
 LEAST_VISITS = 10  # to 0; that none of them passes it is 1 in 1000
 SURE_ERRORS = 2.0  # standard errors
 
@@ -209,7 +209,7 @@ def of_drives(offsets: Sequence[FloatArray], widths: Sequence[FloatArray]) -> li
 
 def of_sides(offset: FloatArray) -> str | None:
     """Whether offsets lost their sign: they come near 0 many times and pass it never, where half would each time."""
-    near = np.abs(offset) < NEAR * float(offset.std())
+    near = np.abs(offset) < NEAR_ZERO * float(offset.std())
     visits = int((np.diff(near.astype(np.int8)) > 0).sum())
     if visits < LEAST_VISITS or offset.min() * offset.max() < 0.0:
         return None

@@ -12,10 +12,10 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.texts import aligned, counted
+from xosc_lateral.base.texts import aligned, counted, hours_in_words
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
-from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, time_in_words, worst_of
+from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, worst_of
 from xosc_lateral.extras.detect.sources import Source
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
 from xosc_lateral.files.source import parsed_hashes
@@ -72,7 +72,7 @@ class Detection(Result):
         detectors = len({curve.detector.title() for curve in self.curves})
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
         both = f"{counted(detectors, 'detector')} on {counted(len(self.origins), 'source')}"
-        what = f"{both}, {time_in_words(hours)} of lane keeping"
+        what = f"{both}, {hours_in_words(hours)} of lane keeping"
         return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
 
     @property
@@ -106,7 +106,7 @@ class Detection(Result):
             lines += [f"{missed}." for missed in not_met(self.carriers)]
         hours = {curve.source: float(curve.hours.sum()) for curve in self.curves}
         hours |= {one.home.source: one.home.hours for one in self.carriers}
-        if few := [f"{source} ({time_in_words(time)})" for source, time in hours.items() if time < 1.0]:
+        if few := [f"{source} ({hours_in_words(time)})" for source, time in hours.items() if time < 1.0]:
             lines.append(
                 f"Less than an hour of lane keeping, so that rates are rough, and none is made of less than "
                 f"{60.0 * LEAST_HOURS:.0f} min: {', '.join(few)}."

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words, time_in_words
+from xosc_lateral.base.texts import hours_in_words
+from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack
 from xosc_lateral.files.pages.chart import ENRICHED, color_of
 from xosc_lateral.files.pages.figure import Figure
@@ -93,7 +94,7 @@ def finding(curves: Sequence[Curve]) -> str:
     alarms = f"raises false alarms: {', '.join(rates)}"
     if not _rate(most):
         hours = sum(float(curve.hours.sum()) for curve in curves)
-        alarms = f"raises no false alarm in {time_in_words(hours)} of lane keeping"
+        alarms = f"raises no false alarm in {hours_in_words(hours)} of lane keeping"
     shares = [100.0 * float(curve.in_time[curve.detector.chosen]) for curve in curves if len(curve.leads)]
     cut_ins = sum(len(curve.leads) for curve in curves)
     low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))

@@ -80,8 +80,7 @@ class PictureScene:
                 around = _seen(_outline(vehicle, self._pose(vehicle, "nominal", time)), camera)
                 ghost = np.vstack([around, around[:1]])
                 panel.line(ghost[:, 0], ghost[:, 1], INK, width=1.0, dashes="3 2", label="without offsets")
-        low = -0.9 * across
-        panel.line((20.0 - REACH, -REACH), (low, low), INK, label=f"20 m; across {wider:.1f} times as large")
+        panel.line((20.0 - REACH, -REACH), (-0.9 * across,) * 2, INK, label=f"20 m; across {wider:.1f} times as large")
         return figure
 
     def _draw_road(self, panel: Panel, camera: tuple[float, float, float]) -> None:

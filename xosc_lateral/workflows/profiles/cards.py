@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.texts import counted
+from xosc_lateral.base.texts import counted, hours_in_words
 from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
@@ -173,8 +173,7 @@ def interval_note(profile: DriverProfile) -> str:
 
 def _amount(known: Provenance) -> str:
     """What a profile was fitted on: time, vehicles, runs."""
-    time = f"{60 * known.hours:.1f} min" if known.hours < 1 else f"{known.hours:.2f} h"
-    return f"{time}, {counted(known.drives, 'vehicle')}, {counted(known.runs, 'run')}"
+    return f"{hours_in_words(known.hours)}, {counted(known.drives, 'vehicle')}, {counted(known.runs, 'run')}"
 
 
 def _outcome(known: Provenance) -> Iterator[tuple[str, str]]:

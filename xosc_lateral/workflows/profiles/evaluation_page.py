@@ -65,11 +65,10 @@ def verdict_figure(verdict: spectra.Verdict) -> Figure:
     figure = Figure(1, 2, height=130.0, share_x="all", share_y="all")
     powers = [ratio for ratio in verdict.ratios if ratio.high]
     ends = min(ratio.low for ratio in powers), max(ratio.high for ratio in powers)
-    like = 1.0 / spectra.TOLERANCE, spectra.TOLERANCE
     for panel, of, color in zip(figure.panels, spectra.BOTH, (SAMPLED, MEASURED), strict=True):
         panel.title, panel.x.label, panel.x.log, panel.y.log = of, "frequency [Hz]", True, True
         panel.x.limits = ends
-        panel.area((*ends, *ends[::-1]), (like[0], like[0], like[1], like[1]), color, opacity=0.12)
+        panel.area((*ends, *ends[::-1]), (1.0 / spectra.TOLERANCE,) * 2 + (spectra.TOLERANCE,) * 2, color, opacity=0.12)
         panel.line(ends, (1.0, 1.0), color, width=0.8, dashes="3 2")
         for each in (ratio for ratio in powers if ratio.of == of):
             middle = (each.low * each.high) ** 0.5
@@ -79,7 +78,7 @@ def verdict_figure(verdict: spectra.Verdict) -> Figure:
     return figure
 
 
-_SURE = {
+VERDICT_SENTENCES = {
     spectra.ALIKE: "moves as other real drivers do", spectra.UNLIKE: "does not move as other real drivers do",
     spectra.NOT_KNOWN: "may or may not move as other real drivers do: these drives are too few to tell",
 }  # fmt: skip
@@ -89,7 +88,7 @@ def finding(scores: ProfileScores) -> str:
     """The verdict in a sentence, and the comparison that does worst."""
     worst, ratio = worst_block(scores)
     far = f"; farthest from them, {ratio:.2f} times as far as they are from each other: {worst}"
-    return f"`{scores.profile}` {_SURE[judged(scores, spectra.DRIVER)]}{far}."
+    return f"`{scores.profile}` {VERDICT_SENTENCES[judged(scores, spectra.DRIVER)]}{far}."
 
 
 NAMED_BLOCKS = 3

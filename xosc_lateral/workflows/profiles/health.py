@@ -135,10 +135,10 @@ class Health(Result):
         if self.read is None:
             return f"can't be read as drives: {self.wrong[0]}"
         known = self.figures
-        side = "left" if known["offset_mean_m"] > 0.0 else "right"
         return (
             f"{counted(known['drives'], 'drive')}, {known['road_following_h']:.2f} of {known['hours']:.2f} h "
-            f"road-following, {known['rate_hz']:.3g} Hz; {abs(known['offset_mean_m']):.2f} m {side} of the lane's "
+            f"road-following, {known['rate_hz']:.3g} Hz; {abs(known['offset_mean_m']):.2f} m "
+            f"{'left' if known['offset_mean_m'] > 0.0 else 'right'} of the lane's "
             f"centre on average, "
             f"spread {known['offset_sd_m']:.2f} m, lanes {known['lane_width_m']:.2f} m wide"
             + ("; as guessed: a mapping is needed" if self.is_guessed else "")
