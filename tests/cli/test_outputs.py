@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.base.plugins import shipped_folder
-from xosc_lateral.cli import GONE, main
+from xosc_lateral.cli import main
+from xosc_lateral.cli.cures import GONE
 
 
 @pytest.fixture
@@ -42,7 +43,7 @@ def _files(folder: Path) -> dict[Path, bytes]:
         ),
         ("convert", ["-o", "out.xosc", "--allow", "nowhere"], "nowhere: no such folder to allow"),
         ("convert", ["-o", "out.xosc", "--profile", "none.json"], "none.json: no such file"),
-        ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or directory"),
+        ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or folder"),
         ("states", ["-o", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
         ("states", ["-o", "out.xlsx"], "out.xlsx: can't write .xlsx: expected a name ending in .csv"),
         ("states", ["-o", "theirs.csv"], "theirs.csv: exists and was not written by xosc-lateral"),
@@ -164,7 +165,7 @@ def test_standard_output_gets_what_the_file_would_hold(
     assert main(["convert", "cut-in.xosc", "-o", "-", "--time-limit", "5"]) == 0
     out, err = capfdbinary.readouterr()
     assert out == Path("same.xosc").read_bytes()
-    assert b"segments" in err
+    assert b"segment" in err
     assert main(["states", "cut-in.xosc", "-o", "-", "--time-limit", "1"]) == 0
     assert capfdbinary.readouterr().out == Path("same.csv").read_bytes()
 
@@ -267,7 +268,7 @@ def test_every_verb_names_a_page_that_exists():
     root = Path(__file__).resolve().parents[2]
     told = [*DOCS_PAGES.values(), *(pages for *_, pages in offered("VERBS").values())]
     assert {page for pages in told for page in pages.split(", ") if not (root / page).exists()} == set()
-    assert set(DOCS_PAGES) | {"__init__", "words"} == {
+    assert set(DOCS_PAGES) | {"__init__", "cures", "words"} == {
         path.stem for path in (root / "xosc_lateral" / "cli").glob("*.py")
     }
 

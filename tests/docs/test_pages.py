@@ -18,6 +18,7 @@ from urllib.parse import unquote
 
 import pytest
 
+from tests.docs.pictures import require_pictures
 from tests.docs.printed import difference
 from xosc_lateral.cli import main, verb
 
@@ -29,6 +30,7 @@ PAGES = sorted(
 )
 RUN = (
     "quickstart.md",
+    "gallery.md",
     "tutorials/test_data_engineer.md",
     "tutorials/researcher.md",
     "how_to/detect.md",
@@ -115,6 +117,7 @@ def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
     for target in re.findall(r"(?:-o|--report) (\S+)", lines):
         written = Path(target)
         assert written.exists() or list(written.parent.glob(f"{written.stem}_*{written.suffix}")), target
+    require_pictures((DOCS / page).read_text(encoding="utf-8"), tmp_path, DOCS / "figures" / "made")
 
 
 @pytest.mark.lint

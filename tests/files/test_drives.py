@@ -213,7 +213,7 @@ def test_files_that_are_no_tables_are_refused(tmp_path: Path, name: str, content
 
 
 def test_a_missing_file_is_said_in_one_line(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"nowhere\.parquet: no such file or directory"):
+    with pytest.raises(FormatError, match=r"nowhere\.parquet: no such file or folder"):
         read_drives(tmp_path / "nowhere.parquet")
 
 

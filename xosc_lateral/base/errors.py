@@ -91,6 +91,10 @@ KINDS = {
     (".xodr",): "a road: name the scenario that drives on it",
     (".json",): "JSON, as driver profiles are: -p FILE names one",
     (".csv", ".gz", ".zst", ".parquet", ".feather", ".arrow"): "a table: fit TABLE -o PROFILE.json makes a profile",
+    (".xlsx", ".xls", ".ods"): "a workbook: save its sheet as CSV",
+    (".txt", ".tsv", ".dat"): "a table if it is text with a header: call it NAME.csv",
+    (".mf4", ".mdf", ".mcap", ".osi", ".bag", ".mat"): "a recording: import FORMAT makes a table of it",
+    (".html", ".htm"): "a page: open it in a browser",
 }
 """Endings of files -> what they are, and where they are wanted."""
 
@@ -100,6 +104,21 @@ def meant_for(path: object) -> str:
     name = str(path).replace("\\", "/").rpartition("/")[2]
     kinds = [words for endings, words in KINDS.items() if name.lower().endswith(endings)]
     return f" ({name} is {kinds[0]})" if kinds else ""
+
+
+def names_beside(path: object) -> list[str]:
+    """What lies in a path's folder; nothing where there is no such folder."""
+    from pathlib import Path
+
+    try:
+        return [other.name for other in Path(str(path)).parent.iterdir()]
+    except (OSError, ValueError):  # a zero byte in the name
+        return []
+
+
+def absent(path: object) -> str:
+    """What is said of a file or folder that is not there, with the one beside it that may be meant."""
+    return f"no such file or folder{did_you_mean(str(path).rpartition('/')[2], names_beside(path))}"
 
 
 def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:

@@ -28,3 +28,13 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows of a table as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def counted(number: int, thing: str) -> str:
+    """``1 segment``, ``2 segments``."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def hours_in_words(hours: float) -> str:
+    """In hours, or in minutes where it is less than one."""
+    return f"{hours:.2f} h" if hours >= 1.0 else f"{60.0 * hours:.1f} min"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from signal import SIGINT
@@ -19,6 +19,7 @@ from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.plugins import offered
 from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
+from xosc_lateral.cli.cures import cures
 from xosc_lateral.files.source import guarding_inputs
 
 VERBS = {
@@ -45,17 +46,6 @@ VERB_MODULES = {
     "view": "play", "segments": "play", "template": "play",
 }  # fmt: skip
 """Verbs whose module, which is loaded when they are used, is not called like them."""
-
-GONE = {
-    "--osi": "--report FILE.mcap", "--summary": "--report FILE.md", "--jam-corridor": "--with jam-corridor",
-    "--entity": "-p NAME=PROFILE", "--road-path": "--road FOLDER", "--cluster": "--jobs ADDRESS",
-    "--player-library": "--player LIBRARY", "--job-timeout": "--job-limit 600s", "--job-memory": "--job-limit 4000MB",
-    "--log-json": "--json --verbose", "--for": "--player", "--resample": "--attempts", "--only": "--enrich",
-    "--train": "--home",
-    "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
-    "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
-}  # fmt: skip
-"""What was an option of a verb -> what takes its place."""
 
 TYPER_STYLE: dict[str, Any] = {
     "no_args_is_help": True,
@@ -143,34 +133,6 @@ def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
     return {"error": {"kind": type(error).__name__, "message": " ".join(_in_words(error).split()), **place}}
 
 
-SIBLINGS = {
-    "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
-    "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
-    "states": ("play",), "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"),
-    "verify": ("diff", "status"), "profiles list": ("list", "profile", "library", "list-profiles"),
-    "template write": ("new", "write-template"), "template list": ("templates", "list-templates"),
-    "convert SCENARIO... or FOLDER": ("convert-many",), "import": ("import-drives", "read-drives"),
-    "close-loop": ("loop", "identify", "refine", "plan-loop"),
-}  # fmt: skip
-"""Verb -> what others call it, Python's calls among them."""
-
-
-def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
-    """What to write in place of words that are wrong usage, where that can be told from them."""
-    first = next(iter(words), "")
-    later = next((word for word in words if word in VERBS), None)
-    if first.startswith("-") and later is not None:
-        yield f"options come after the verb: {later} ... {first}"
-    elif first not in VERBS and not first.startswith("-"):
-        name = first.replace("_", "-").lower()
-        yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
-    yield from (f"{old} is gone: {today}" for old, today in GONE.items() if f"No such option: {old}" in wrong)
-    if "'--profile'" in wrong and "Missing" in wrong:
-        yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
-    if "not a valid float" in wrong:
-        yield "a number without its unit is expected, in the one that the option's help names: s, m, m/s, Hz"
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 128 + a signal."""
     words = sys.argv[1:] if argv is None else list(argv)
@@ -182,7 +144,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            line = in_terminal(f"xosc-lateral: {' '.join(_in_words(error).split())}")
+            line = "; ".join([_in_words(error), *cures(words)])
+            line = in_terminal(f"xosc-lateral: {' '.join(line.split())}")
             if "--json" in words and {"-v", "--verbose"} & {*words}:
                 line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
             print(line, file=sys.stderr)
@@ -201,7 +164,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         usage = cast(Any, error)
         usage.show()
-        for cure in _cures(words, str(usage.format_message())):
+        for cure in cures(words, usage):
             print(in_terminal(f"xosc-lateral: {cure}"), file=sys.stderr)
         code = usage.exit_code
     if argv is None:

@@ -179,7 +179,9 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
     from xosc_lateral.workflows.batch.call import convert_many
 
     if output is None or output == "-":
-        raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
+        raise typer.BadParameter(
+            "several scenarios need a folder for their outputs, -o FOLDER; of one, -o names the output", param_hint="-o"
+        )
 
     def show(row: Mapping[str, Any]) -> None:
         if reply.as_json:

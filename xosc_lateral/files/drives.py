@@ -203,6 +203,9 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
         if source.column not in table.columns:
             what = f"no column {source.column!r} for {name}; there are {listed(table.columns)}"
             raise FormatError(what, path=path, line=1)
+        if source.column in STANDARD and name not in STANDARD:
+            what = f"{name}={source.column}: the standard name comes first, {source.column}={name}"
+            raise FormatError(what, path=path, element="--map")
     table = chosen_rows(
         table, mapping.missing, mapping.rows, path, mapping.columns.get("time", ColumnSource("time")).column
     )

@@ -12,7 +12,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError, did_you_mean, meant_for
+from xosc_lateral.base.errors import (
+    DriverProfileError,
+    FormatError,
+    XoscLateralError,
+    did_you_mean,
+    meant_for,
+    names_beside,
+)
 from xosc_lateral.base.limits import PROFILE_SIZE
 from xosc_lateral.base.plugins import plugins, shipped_folder
 from xosc_lateral.base.texts import composed
@@ -58,7 +65,7 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         return offered
     known = sorted({path.stem for path in list_profiles(folders)})
     error = DriverProfileError(
-        f"no profile {text!r}{did_you_mean(text, known)}; known are {', '.join(known) or 'none'}, "
+        f"no profile {text!r}{did_you_mean(text, known + names_beside(text))}; known are {', '.join(known) or 'none'}, "
         "or give the path of a file"
     )
     error.unknown = text

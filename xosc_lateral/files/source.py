@@ -25,7 +25,7 @@ from logging import getLogger
 from pathlib import Path
 from typing import IO, Any
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, absent, names_beside
 from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
 from xosc_lateral.files.held import held_bytes
 
@@ -148,7 +148,8 @@ def check_regular(path: Path) -> os.stat_result:
         raise _unreadable(error, path) from error
     if not stat.S_ISREG(state.st_mode):
         what = next((name for is_kind, name in _KINDS if is_kind(state.st_mode)), "something else")
-        raise FormatError(f"is {what}, not a file", path=path)
+        inside = ", ".join(sorted(names_beside(path / "x"))[:3])
+        raise FormatError(f"is {what}, not a file{inside and f'; it holds {inside}'}", path=path)
     return state
 
 
@@ -233,6 +234,7 @@ def _part(file: IO[bytes], path: Path) -> bytes:
 
 def _unreadable(error: OSError | ValueError, path: Path) -> FormatError:
     what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    what = absent(path) if isinstance(error, FileNotFoundError) else what
     return FormatError(f"{what[:1].lower()}{what[1:]}", path=path)
 
 

@@ -103,3 +103,21 @@ def test_drives_to_one_side_and_noise_are_named() -> None:
     assert evidence.of_drives(drives, widths) == []
     assert "to the left" in evidence.of_drives([one + 0.8 for one in drives], widths)[0]
     assert "err by 0.3" in evidence.of_drives([one + 0.3 * rng.normal(size=600) for one in drives], widths)[0]
+
+
+def test_offsets_that_lost_their_sign_are_told_and_one_sided_drivers_are_not() -> None:
+    from xosc_lateral import sample
+
+    for seed in range(3):
+        offset = sample("motorway", duration=600.0, seed=seed).to_frame()["offset"].to_numpy()
+        assert "their sign is lost" in (evidence.of_sides(np.abs(offset)) or "")
+        assert evidence.of_sides(offset) is None
+        assert evidence.of_sides(offset - offset.min() + 1e-3) is None  # keeps to the left, and just not beyond 0
+
+
+def test_a_drive_that_is_there_twice_is_told() -> None:
+    one, other = np.sin(np.arange(50.0)), np.cos(np.arange(50.0))
+    width = np.full(50, WIDTH)
+    assert not evidence.of_drives([one, other], [width] * 2)
+    (said,) = evidence.of_drives([one, other, one], [width] * 3)
+    assert said.startswith("1 of 3 drives repeat another one")

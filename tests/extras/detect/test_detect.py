@@ -37,7 +37,7 @@ def test_nominal_traffic_raises_no_false_alarm_and_the_text_says_what_that_means
     result = xl.detect("cut-in.xosc", ego="none", variants=2)
     assert result.sources == ("cut-in", "cut-in, motorway")
     assert all(one["false_alarms"] == 0 for one in result.rows() if one["source"] == "cut-in")
-    assert result.still == {"cut-in"} and "no false alarms by construction" in str(result)
+    assert result.still == {"cut-in"} and "no false alarm by construction" in str(result)
     nominal, lifelike = (row(result, source, "time-to-line") for source in result.sources)
     assert nominal["cut_ins"] == 1 and lifelike["cut_ins"] == 2
     assert lifelike["hours"] == pytest.approx(2.0 * nominal["hours"], rel=0.2)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -283,3 +285,17 @@ def test_a_short_lateral_action_leaves_no_rest_of_the_driver_that_is_dropped_at_
     run = live_esmini(BORDER.with_name("a09_rep_swerve.xosc"), REAL, ego=["Ego"], seed=seed, duration=30.0, step=0.01)
     own = run.to_frame()
     assert np.abs(np.diff(own[own.name == "T"].y)).max() < 0.012
+
+
+@needs_esmini
+def test_an_output_under_an_own_ego_goes_as_the_page_says(tmp_path: Path) -> None:
+    """`examples/own_ego.py` in a process of its own, beside what docs/how_to/esmini.md shows of it."""
+    root = Path(__file__).resolve().parents[3]
+    page = (root / "docs" / "how_to" / "esmini.md").read_text(encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, str(root / "examples" / "own_ego.py"), str(tmp_path)],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    shown = [line for line in page.splitlines() if " s: ego " in line]
+    assert shown
+    assert [line for line in run.stdout.splitlines() if " s: ego " in line] == shown

@@ -76,3 +76,15 @@ def test_all_twelve_colours_differ(theme, least, vision):
     """About 2 is just noticeable side by side; Okabe and Ito's own six colours have 10.9 at the least."""
     seen = [lab(np.asarray(VISION[vision]) @ linear(color)) for color in themes()[theme]]
     assert min(ciede2000(one, other) for one, other in combinations(seen, 2)) >= least
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("back", ["paper", "shade", "good-back", "bad-back"])
+@pytest.mark.parametrize("text", ["ink", "muted", "accent", "good", "bad"])
+def test_every_text_can_be_read_on_every_background(scheme, back, text):
+    """WCAG 2.2, 1.4.3: 4.5 to 1, from relative luminances."""
+    css = files("xosc_lateral.files.pages").joinpath("static/page.css").read_text().split("@media")
+    colors = [dict(re.findall(r"--([a-z0-9-]+): (#[0-9a-f]{6})", part)) for part in css[:2]]
+    theme = colors[0] | (colors[1] if scheme == "dark" else {})
+    dim, bright = sorted(float(linear(theme[name]) @ TO_XYZ[1]) for name in (back, text))
+    assert (bright + 0.05) / (dim + 0.05) >= 4.5

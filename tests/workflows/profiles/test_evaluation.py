@@ -103,7 +103,10 @@ def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, pro
         assert main(words) == 0
         pages.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pages[0] == pages[1]
-    assert pages[0].count("<figure") == 6, "traces, four evaluations, spectrum and autocorrelation"
+    assert pages[0].count("<figure") == 4, "verdict, traces, violins, spectrum and autocorrelation"
+    assert pages[0].index("<figure") < pages[0].index("<h2") and pages[0].count("<summary><h2") > 4, (
+        "the rest is folded"
+    )
     assert "measured" in pages[0] and "sampled" in pages[0] and "drives.parquet" in pages[0]
     assert not re.search(r"\bsrc=|@import", pages[0].split("<script>")[0]) and 'href="http' not in pages[0], (
         "opens offline"

@@ -15,7 +15,6 @@ from xosc_lateral.workflows.playing.figures import (
     offsets_over_time,
     shown_rows,
     speeds_over_time,
-    timeline,
 )
 
 
@@ -69,18 +68,6 @@ def test_accelerations_are_what_was_added_between_the_bounds_of_real_drivers(enr
         levels = {float(mark.y[0]) for mark in panel.marks if mark.dashes}
         assert levels == {-USUAL_ACCELERATION, USUAL_ACCELERATION}
         assert [mark.color for mark in panel.marks if mark.label == "added"] == [color_of(number)]
-
-
-def test_the_timeline_has_a_bar_for_every_span_that_says_what_it_is(enriched: Enriched) -> None:
-    (panel,) = timeline(enriched).panels
-    bars = [(tuple(mark.x), int(mark.y[0]), mark.label) for mark in panel.curves()]
-    expected = [
-        ((span.start, span.end), number, span.kind.value)
-        for number, one in enumerate(enriched.entities)
-        for span in one.spans
-    ]
-    assert bars == expected
-    assert panel.y.ends[0] > panel.y.ends[1]  # the first entity on top
 
 
 def test_a_line_breaks_where_it_is_told_to_and_nowhere_else() -> None:

@@ -198,11 +198,12 @@ class Ratio:
         return judged(*self.interval)
 
     def in_words(self) -> str:
-        """With interval and cause."""
-        return f"{self.name} {self.ratio:.2f} ({self.interval[0]:.2f} to {self.interval[1]:.2f}, {self.cause})"
+        """With interval, and cause where it is not the driver."""
+        cause = "" if self.cause == DRIVER else f", by the {self.cause}"
+        return f"{self.name} {self.ratio:.2f} times theirs ({self.interval[0]:.2f} to {self.interval[1]:.2f}{cause})"
 
 
-NAMED_RATIOS = 3  # That one line names. [-]
+NAMED_RATIOS = 1  # That one line names. [-]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.texts import aligned
+from xosc_lateral.base.texts import aligned, counted, hours_in_words
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
 from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, plain, worst_of
@@ -72,7 +72,8 @@ class Detection(Result):
         """See `Result`."""
         detectors = len({curve.detector.title() for curve in self.curves})
         hours = sum({curve.source: float(curve.hours.sum()) for curve in self.curves}.values())
-        what = f"{detectors} detectors on {len(self.origins)} sources, {hours:.2f} h of lane keeping"
+        both = f"{counted(detectors, 'detector')} on {counted(len(self.origins), 'source')}"
+        what = f"{both}, {hours_in_words(hours)} of lane keeping"
         return what if self.goal is None else f"{what}; thresholds from {len(self.homes)} homes at {self.goal.text}"
 
     @property
@@ -106,7 +107,7 @@ class Detection(Result):
             lines += [f"{missed}." for missed in not_met(self.carriers)]
         hours = {curve.source: float(curve.hours.sum()) for curve in self.curves}
         hours |= {one.home.source: one.home.hours for one in self.carriers}
-        if few := [f"{source} ({time:.2f} h)" for source, time in hours.items() if time < 1.0]:
+        if few := [f"{source} ({hours_in_words(time)})" for source, time in hours.items() if time < 1.0]:
             lines.append(
                 f"Less than an hour of lane keeping, so that rates are rough, and none is made of less than "
                 f"{60.0 * LEAST_HOURS:.0f} min: {', '.join(few)}."
@@ -114,8 +115,8 @@ class Detection(Result):
         silent = sorted(self.still)
         if silent:
             lines.append(
-                f"{', '.join(silent)}: no vehicle moves inside its lane, so that there are no false alarms by "
-                "construction: that says nothing about a detector."
+                f"{', '.join(silent)}: no vehicle moves inside its lane, so that what watches movement raises no "
+                "false alarm by construction: that says nothing about a detector."
             )
         alone = [curve for curve in self.curves if curve.detector.needs_observer and not len(curve.hours)]
         left = sorted({f"{curve.detector.name} on {curve.source}" for curve in alone})

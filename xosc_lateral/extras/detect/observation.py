@@ -69,7 +69,7 @@ def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str
         except ValueError:
             numbers[name] = np.nan
         if not low <= numbers[name] <= high:
-            raise ValueError(f"{word!r}: expected a number from {low:g} to {high:g}")
+            raise ValueError(f"{word!r}: expected a number from {low:g} to {high:g}, its unit left out")
     return numbers
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from xosc_lateral.base.texts import hours_in_words
 from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack
 from xosc_lateral.files.pages.chart import ENRICHED, color_of
@@ -32,7 +33,6 @@ def detection_page(
     telling = _telling(curves)
     page.lead(*([finding(telling)] if telling else []), lead[0])
     if telling:
-        page.section("Finding")
         page.figure(
             alarms_figure(telling),
             f"False alarms an hour over the threshold; none at all is drawn at {LEAST_RATE:g}. The dot is the one that "
@@ -42,7 +42,9 @@ def detection_page(
     page.table(table, "At the thresholds that are set; in brackets 95 % intervals")
     page.text(*lead[1:])
     page.section(
-        "Curves", "From left to right, thresholds become more sensitive. The dot is the threshold that is set."
+        "Curves",
+        "From left to right, thresholds become more sensitive. The dot is the threshold that is set.",
+        folded=True,
     )
     page.figure(curves_figure(curves), "Cut-ins seen before the marking is crossed, and how long before")
     page.section("Worst cases")
@@ -65,15 +67,17 @@ def detection_page(
 
 
 def _telling(curves: Sequence[Curve]) -> list[Curve]:
-    """Of the detector whose false alarms differ most between sources, or are most of all where there is one source."""
+    """Of the detector whose false alarms differ most between sources, or are most of all where there is one source;
+    one that sees cut-ins, if any does."""
     detectors: dict[str, list[Curve]] = {}
     for curve in curves:
         if curve.hours.sum() > 0.0:
             detectors.setdefault(curve.detector.label(), []).append(curve)
 
-    def spread(some: Sequence[Curve]) -> float:
+    def spread(some: Sequence[Curve]) -> tuple[bool, float]:
         rates = [_rate(curve) for curve in some]
-        return max(rates) - (min(rates) if len(rates) > 1 else 0.0)
+        sees = any(curve.seen(0.0)[curve.detector.chosen] > 0.0 for curve in some if len(curve.leads))
+        return sees, max(rates) - (min(rates) if len(rates) > 1 else 0.0)
 
     return max(detectors.values(), key=spread, default=[])
 
@@ -86,15 +90,17 @@ def _rate(curve: Curve) -> float:
 def finding(curves: Sequence[Curve]) -> str:
     """What one detector does on the sources where it alarms least and most, in a sentence."""
     fewest, most = min(curves, key=_rate), max(curves, key=_rate)
-    rates = [f"{_alarms(most)} on {most.source}"]
-    if most is not fewest:
-        rates.append(f"{_alarms(fewest)} on {fewest.source}")
+    rates = [f"{_alarms(curve)} on {curve.source}" for curve in dict.fromkeys((most, fewest))]
+    alarms = f"raises false alarms: {', '.join(rates)}"
+    if not _rate(most):
+        hours = sum(float(curve.hours.sum()) for curve in curves)
+        alarms = f"raises no false alarm in {hours_in_words(hours)} of lane keeping"
     shares = [100.0 * float(curve.seen(0.0)[curve.detector.chosen]) for curve in curves if len(curve.leads)]
     cut_ins = sum(len(curve.leads) for curve in curves)
     low, high = (f"{end(shares, default=0.0):.0f}" for end in (min, max))
     seen = f"{low} %" if low == high else f"{low} to {high} %, by source,"
     before = f"; it sees {seen} of {cut_ins} cut-ins before the marking" if shares else ""
-    return f"{curves[0].detector.label()} raises false alarms: {', '.join(rates)}{before}."
+    return f"{curves[0].detector.label()} {alarms}{before}."
 
 
 def _alarms(curve: Curve) -> str:

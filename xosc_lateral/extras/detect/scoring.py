@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.texts import hours_in_words
 from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector
 from xosc_lateral.extras.detect.observation import View
 from xosc_lateral.extras.detect.tracks import MARGIN_ROWS, STEP, LaneChange, Scene
@@ -45,7 +46,7 @@ CASE_MARGIN = 6.0
 
 def alarms_in_words(count: int, hours: float, rate: str) -> str:
     """False alarms as a rate, or, where there is too little to make one of, as they were counted."""
-    return f"{rate} an hour" if hours >= LEAST_HOURS else f"{count} in {60.0 * hours:.1f} min"
+    return f"{rate} an hour" if hours >= LEAST_HOURS else f"{count} in {hours_in_words(hours)}"
 
 
 def worst_of(cases: Sequence[tuple[str, str, Case]]) -> list[tuple[str, str, Case]]:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from xosc_lateral.base.errors import FormatError, NotEnoughDataError
+from xosc_lateral.base.errors import FormatError, NotEnoughDataError, absent
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH, Drive
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, views_of
@@ -83,7 +83,7 @@ def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
     Raises `FormatError`, `NotEnoughDataError`: there is nothing of that name, or nothing in it.
     """
     if not exists(path):
-        raise FormatError("no such file or folder", path=path)
+        raise FormatError(absent(path), path=path)
     scenarios = _scenarios(path)
     if not scenarios:
         return [_measured(path, settings)]

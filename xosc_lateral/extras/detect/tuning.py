@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -202,14 +202,11 @@ def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, 
     folds = folds_of([view for _, several in views for view in several], source, every_changes=True)
     scored_views: list[Scored] = []
     for fold in sorted(set(folds.values())):
-        trained = learner(_outside(views, folds, fold), source)
+        others = (view for _, several in views for view in several if folds[view.track.cluster] != fold)
+        trained = learner(others, source)
         held = [(scene, [view for view in several if folds[view.track.cluster] == fold]) for scene, several in views]
         scored_views += scored(trained, [(scene, several) for scene, several in held if several])
     return learner((view for _, several in views for view in several), source), scored_views
-
-
-def _outside(views: Views, folds: Mapping[str, int], fold: int) -> Iterable[View]:
-    return (view for _, several in views for view in several if folds[view.track.cluster] != fold)
 
 
 def folds_of(views: Sequence[View], source: str, *, every_changes: bool) -> dict[str, int]:

@@ -15,6 +15,7 @@ from lxml import etree
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.numbers import NORMAL_90
+from xosc_lateral.base.texts import counted
 from xosc_lateral.base.version import __version__
 from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
@@ -320,7 +321,7 @@ class Variations(Result):
     def headline(self) -> str:
         """One line."""
         count = len(self.changes[0].durations)
-        return f"{count} variations of {len(self.changes)} lane changes: {self.distribution}"
+        return f"{counted(count, 'variation')} of {counted(len(self.changes), 'lane change')}: {self.distribution}"
 
     def __str__(self) -> str:
         speeds = (

@@ -13,6 +13,7 @@ import numpy as np
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.dossier.claims import Measure
 from xosc_lateral.workflows.batch.manifest import ManifestRow
+from xosc_lateral.workflows.batch.page import has_new_contact
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import convert
 from xosc_lateral.workflows.playing.templates import write_template
@@ -73,10 +74,6 @@ class ProfileBench:
             return cast("Detection", detection)
 
 
-def _differing_outputs(bench: ProfileBench) -> float:
-    return float(sum(first.data != second.data for first, second in bench.conversions))
-
-
 def _not_reproduced(bench: ProfileBench) -> float:
     from xosc_lateral.files.profiles import write_profile
     from xosc_lateral.workflows.batch.verify import verify
@@ -108,18 +105,6 @@ def _event_shift(bench: ProfileBench) -> float:
     return max((abs(value) for one in shifts for value in (one.unexplained_start, one.unexplained_end)), default=0.0)
 
 
-def _new_trouble(bench: ProfileBench) -> float:
-    return float(sum(made.movement.trouble for made, _ in bench.conversions))
-
-
-def _short_ratio(bench: ProfileBench) -> float | None:
-    return None if bench.evaluation is None else bench.evaluation.ratio
-
-
-def _long_ratio(bench: ProfileBench) -> float | None:
-    return None if bench.evaluation is None else _number_at(bench.evaluation.to_dict(), "long_snippets")
-
-
 def _number_at(evaluation: Mapping[str, Any], snippets: str) -> float | None:
     """Mean ratio of snippets in plain values that anybody may have written; None where there is none."""
     values = evaluation.get(snippets)
@@ -128,13 +113,13 @@ def _number_at(evaluation: Mapping[str, Any], snippets: str) -> float | None:
 
 
 PROFILE_MEASURES: Mapping[str, Measure] = {
-    "differing_outputs": _differing_outputs,
+    "differing_outputs": lambda bench: float(sum(first.data != second.data for first, second in bench.conversions)),
     "not_reproduced": _not_reproduced,
     "playback_error": _playback_error,
     "event_shift": _event_shift,
-    "new_trouble": _new_trouble,
-    "short_ratio": _short_ratio,
-    "long_ratio": _long_ratio,
+    "new_trouble": lambda bench: float(sum(made.movement.trouble for made, _ in bench.conversions)),
+    "short_ratio": lambda bench: bench.evaluation and bench.evaluation.ratio,
+    "long_ratio": lambda bench: bench.evaluation and _number_at(bench.evaluation.to_dict(), "long_snippets"),
 }
 
 
@@ -156,25 +141,16 @@ class FolderBench(NamedTuple):
     rows: tuple[ManifestRow, ...]
 
 
-def _failed_outputs(bench: FolderBench) -> float:
-    return float(sum(bool(row.error) for row in bench.rows))
-
-
 def _outputs_that_differ(bench: FolderBench) -> float:
     from xosc_lateral.workflows.batch.verify import verify
 
     return float(len(verify(bench.folder, workers=0).failing))
 
 
-def _outputs_with_new_contacts(bench: FolderBench) -> float:
-    gaps = [(row.gap_before, row.gap_after) for row in bench.rows]
-    return float(sum(after is not None and after <= 0.0 and not (before or 0.0) <= 0.0 for before, after in gaps))
-
-
 FOLDER_MEASURES: Mapping[str, Measure] = {
-    "failed_outputs": _failed_outputs,
+    "failed_outputs": lambda bench: float(sum(bool(row.error) for row in bench.rows)),
     "outputs_that_differ": _outputs_that_differ,
-    "outputs_with_new_contacts": _outputs_with_new_contacts,
+    "outputs_with_new_contacts": lambda bench: float(sum(map(has_new_contact, bench.rows))),
 }
 
 READ_FROM_MANIFEST = ("failed_outputs", "outputs_with_new_contacts")

@@ -41,7 +41,8 @@ def dossier_page(
             page.warning(f"Broken claim: {finding.claim.words}")
 
     def begin(part: str, title: str) -> None:
-        page.section(title, f"Answers: {'; '.join(contents.clauses.get(part, ['no clause']))}.")
+        what = f"Answers: {'; '.join(contents.clauses.get(part, ['no clause']))}."
+        page.section(title, what, folded=part not in ("purpose", "claims"))
 
     begin("purpose", "Purpose and scope")
     page.text(contents.purpose)

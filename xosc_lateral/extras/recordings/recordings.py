@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, absent
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import require_along_lanes
@@ -90,7 +90,7 @@ def read_recordings(
     if kind not in (*READERS, "tracks"):
         raise FormatError(f"no recording format {kind!r}; there are {', '.join((*READERS, 'tracks'))}", path=source)
     if not exists(source):
-        raise FormatError("no such file or folder", path=source)
+        raise FormatError(absent(source), path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
         if kind == "tracks":
             every = _tracks(source, road, as_mapping(columns), recording)

@@ -9,7 +9,7 @@ from math import isfinite
 
 from lxml import etree
 
-from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.errors import FormatError, meant_for
 from xosc_lateral.base.note import Note
 from xosc_lateral.files.xml import line_of
 from xosc_lateral.world.road.piecewise import Cubic
@@ -91,7 +91,8 @@ def plain_root(root: XmlElement, path: str) -> XmlElement:
         for element in root.iter(etree.Element):
             element.tag = element.tag.rpartition("}")[2]
     if root.tag != "OpenDRIVE":
-        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'", path=path, line=line_of(root))
+        hint = meant_for(".xosc") if root.tag == "OpenSCENARIO" else ""
+        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'{hint}", path=path, line=line_of(root))
     return root
 
 

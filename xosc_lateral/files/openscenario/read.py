@@ -9,7 +9,7 @@ from pathlib import Path, PureWindowsPath
 from lxml import etree
 from msgspec import Struct
 
-from xosc_lateral.base.errors import FormatError, meant_for
+from xosc_lateral.base.errors import FormatError, absent, meant_for
 from xosc_lateral.base.note import Note
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
@@ -89,7 +89,7 @@ class RoadSearch(Struct, frozen=True):
             if not folder.is_dir():
                 raise FormatError("no such folder to look for roads in", path=folder)
         if self.file is not None and not is_file(self.file):
-            raise FormatError("no such road", path=self.file)
+            raise FormatError(absent(self.file), path=self.file)
 
 
 NO_ROADS = RoadSearch()
@@ -201,7 +201,7 @@ def _road_file(logic: XmlElement, written: str, boundary: Boundary, notes: list[
         road = boundary.inside(written, place)
         if is_file(road):
             return road
-        missing = place.error(f"road file '{written}' does not exist (looked for {road})")
+        missing = place.error(f"road file '{written}': {absent(road)} (looked for {road}); --road FILE names another")
     except FormatError as error:
         missing = error
     if is_town(written):

@@ -23,7 +23,7 @@ PALETTE = (
     *(BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY),
     *("#781e4b", "#a50000", "#2d1ec3", "#5a694b", "#846078", "#b4b4a8"),
 )
-INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#6a737b", "#dde1e4", "#eef1f3", "#ffffff"
+INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#646d75", "#dde1e4", "#eef1f3", "#ffffff"
 
 # The same thing has the same colour in every report.
 MEASURED, SAMPLED = BLUE, VERMILLION

@@ -71,15 +71,6 @@ class Html(str):
     __slots__ = ()
 
 
-class Group(NamedTuple):
-    """What several things have in common."""
-
-    number: int
-    what: str
-    members: Sequence[str]  # A line each; folded away until somebody asks.
-    tone: Tone = ""
-
-
 class Page:
     """A page in the making."""
 
@@ -89,6 +80,7 @@ class Page:
         self._main: list[str] = []
         self._contents: list[tuple[str, str]] = []
         self._scripts: list[str] = []
+        self._end = ""  # of a section that is folded
 
     def lead(self, *paragraphs: str) -> None:
         """Add to what stands above everything."""
@@ -103,11 +95,13 @@ class Page:
         """Add a warning to the lead."""
         self._lead.append(f'<div class="warning" role="note"><strong>Warning</strong>{inline(text)}</div>')
 
-    def section(self, title: str, *paragraphs: str) -> None:
-        """Begin a section; it appears in the table of contents."""
+    def section(self, title: str, *paragraphs: str, folded: bool = False) -> None:
+        """Begin a section; it appears in the table of contents. `folded`: away, until somebody asks for it."""
         anchor = f"s{len(self._contents) + 1}"
         self._contents.append((anchor, title))
-        self._main.append(f'<h2 id="{anchor}">{inline(title)}</h2>')
+        begin, end = ("<details><summary>", "</summary>") if folded else ("", "")
+        self._main.append(f'{self._end}{begin}<h2 id="{anchor}">{inline(title)}</h2>{end}')
+        self._end = "</details>" if folded else ""
         self.text(*paragraphs)
 
     def heading(self, title: str, *, anchor: str = "") -> None:
@@ -124,13 +118,12 @@ class Page:
         points = _points(lines)
         self._main += [f"<ul>{points}</ul>"] if points else []
 
-    def groups(self, groups: Iterable[Group]) -> None:
-        """Add groups, each a line with its number that unfolds into its members."""
-        self._main += [
-            f'<details class="{" ".join(filter(None, ("group", one.tone)))}"><summary><b>{one.number}</b> '
-            f"{inline(one.what)}</summary><ul>{_points(one.members)}</ul></details>"
-            for one in groups
-        ]
+    def group(self, number: int, what: str, members: Iterable[str], tone: Tone = "") -> None:
+        """Add what so many have in common: a line that unfolds into them."""
+        self._main.append(
+            f'<details class="{" ".join(filter(None, ("group", tone)))}"><summary><b>{number}</b> '
+            f"{inline(what)}</summary><ul>{_points(members)}</ul></details>"
+        )
 
     def figure(self, figure: Figure, caption: str, alt: str = "", *, over_time: bool = False) -> None:
         """Add a figure with a caption; `alt`: for those who can't see it; `over_time`: x is the player's time."""
@@ -197,7 +190,7 @@ class Page:
                 *self._lead,
                 f"</header>\n{nav}\n<main>",
                 *self._main,
-                f"</main>\n<footer>Made by xosc-lateral {__version__}.{facts}</footer>\n</div>",
+                f"{self._end}</main>\n<footer>Made by xosc-lateral {__version__}.{facts}</footer>\n</div>",
                 *(f"<script>{script}</script>" for script in scripts),
                 "</body>\n</html>\n",
             ]
@@ -210,7 +203,8 @@ class Page:
 
 PLAYER_KEYS = (
     '<details class="keys"><summary>Keys</summary><p>Space: play or pause. ← →: 0.1 s back or on, with Shift 1 s. '
-    "↑ ↓: lateral stretch. + −: zoom. F: follow the next vehicle. 0: show everything. Home, End: start and end. In a "
+    "↑ ↓: lateral stretch; 1: true proportions. &lt; &gt;: slower, faster. + −: zoom. F: follow the next vehicle. "
+    "0: show everything. Home, End: start and end. In a "
     "figure over time: click to take the player to that time.</p></details>"
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,8 +19,8 @@ DPI = 108.0
 """1.5 pixels to a point of a figure."""
 
 
-def raster(figure: Figure) -> Image:
-    """Pixels of a figure.
+def rasters(figures: Iterable[Figure]) -> Iterator[Image]:
+    """Pixels of each figure.
 
     Raises
     ------
@@ -33,14 +34,15 @@ def raster(figure: Figure) -> Image:
         raise XoscLateralError(
             "PNG and GIF need Pillow and resvg: pip install 'xosc-lateral[pictures]'; .svg does not"
         ) from error
-    svg, font = figure.svg(), ImageFont.load_default(TEXT_SIZE)
+    font = ImageFont.load_default(TEXT_SIZE)
     assert isinstance(font, ImageFont.FreeTypeFont)
     with TemporaryDirectory() as folder:
         file = Path(folder) / "font.ttf"
         file.write_bytes(font.font_bytes)  # Pillow's own is the same everywhere; others are for letters that it lacks
         family = f"svg, text {{ font-family: {font.getname()[0]} }}"
-        pixels = svg_to_bytes(
-            svg_string=svg, dpi=DPI, background=PAPER, style_sheet=family, font_files=[str(file)],
-            skip_system_fonts=svg.isascii(),
-        )  # fmt: skip
-    return Image.open(BytesIO(pixels)).convert("RGB")
+        for svg in (figure.svg() for figure in figures):
+            pixels = svg_to_bytes(
+                svg_string=svg, dpi=DPI, background=PAPER, style_sheet=family, font_files=[str(file)],
+                skip_system_fonts=svg.isascii(),
+            )  # fmt: skip
+            yield Image.open(BytesIO(pixels)).convert("RGB")

@@ -9,8 +9,9 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from xosc_lateral.base.texts import counted
 from xosc_lateral.files.atomic import write_atomically
-from xosc_lateral.files.pages.page import Group, Html, KeyFigure, Page, Tone
+from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone
 from xosc_lateral.workflows.batch.jobs import Batch
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 
@@ -36,13 +37,13 @@ def write_batch_index(batch: Batch, folder: Path) -> Path:
 def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str) -> str:
     """HTML index of a batch; same rows, same bytes. `links`: output -> its page; `name`: of the output folder."""
     failed = by_cause((row, row.error) for row in rows if row.error)
-    contacts = [row for row in rows if _has_new_contact(row)]
+    contacts = [row for row in rows if has_new_contact(row)]
     in_trials = [row for row in rows if row.trial_contacts and not row.error and row not in contacts]
     warned = by_cause((row, warning) for row in rows if not row.error for warning in row.warnings)
-    lost, causes = sum(bool(row.error) for row in rows), f"{len(failed)} cause{'s' if len(failed) != 1 else ''}"
+    lost = sum(bool(row.error) for row in rows)
     page = Page(f"Batch {name}")
     page.lead(
-        f"{lost} of {len(rows)} outputs could not be made, for {causes}."
+        f"{lost} of {len(rows)} outputs could not be made, for {counted(len(failed), 'cause')}."
         if lost
         else f"All {len(rows)} outputs are made.",
     )
@@ -60,15 +61,17 @@ def batch_page(rows: Sequence[ManifestRow], links: Mapping[str, str], name: str)
     )  # fmt: skip
     if failed:
         page.section("What failed")
-        page.groups(_groups(failed, links, "bad"))
+        for cause, some in failed:
+            page.group(len(some), cause, [_linked(row, links) for row in some], "bad")
     if contacts:
         page.section("New contacts", "Vehicles touch in the nominal run, and do not with the maneuvers alone.")
         page.items(_linked(row, links) for row in contacts)
     if warned:
         page.section("Warnings")
-        page.groups(_groups(warned, links))
-    ranked = sorted(rows, key=_urgency)
-    tones: dict[int, Tone] = {k: "bad" for k, row in enumerate(ranked) if row.error or _has_new_contact(row)}
+        for cause, some in warned:
+            page.group(len(some), cause, [_linked(row, links) for row in some])
+    ranked = sorted(rows, key=lambda row: (not row.error, not has_new_contact(row), -len(row.warnings), row.output))
+    tones: dict[int, Tone] = {k: "bad" for k, row in enumerate(ranked) if row.error or has_new_contact(row)}
     formats = dict.fromkeys(("std. deviation of offsets [m]", *GAP_COLUMNS), ".2f")
     page.section("Outputs", "Pictures show the paths from above, with the scale across the road exaggerated.")
     page.table([_cells(row, links) for row in ranked], "", formats=formats, tones=tones, long=True)
@@ -89,33 +92,23 @@ def by_cause(remarks: Iterable[tuple[ManifestRow, str]]) -> list[tuple[str, list
     return sorted(named, key=lambda item: (-len(item[1]), item[0]))
 
 
-def _groups(
-    causes: Sequence[tuple[str, Sequence[ManifestRow]]], links: Mapping[str, str], tone: Tone = ""
-) -> list[Group]:
-    return [Group(len(rows), cause, [_linked(row, links) for row in rows], tone) for cause, rows in causes]
-
-
 def _linked(row: ManifestRow, links: Mapping[str, str]) -> Html:
     name, why = escape(row.output), f": {escape(row.error)}" if row.error else ""
     link = links.get(row.output)
     return Html(f'<a href="{escape(link)}">{name}</a>{why}' if link else f"{name}{why}")
 
 
-def _has_new_contact(row: ManifestRow) -> bool:
+def has_new_contact(row: ManifestRow) -> bool:
     """Whether vehicles touch that nominally don't."""
     before = float("inf") if row.gap_before is None else row.gap_before
     return row.gap_after is not None and row.gap_after <= 0.0 < before
-
-
-def _urgency(row: ManifestRow) -> tuple[int, int, str]:
-    return 0 if row.error else 1 if _has_new_contact(row) else 2, -len(row.warnings), row.output
 
 
 def _cells(row: ManifestRow, links: Mapping[str, str]) -> dict[str, object]:
     name, done, link = escape(row.output), not row.error, links.get(row.output, "")
     anchor, picture = f'<a href="{escape(link)}">', escape(f"{link.removesuffix('.html')}.svg")
     image = f'<img loading="lazy" width="100" height="32" src="{picture}" alt="Paths in {name}">'
-    status = "failed" if row.error else "new contact" if _has_new_contact(row) else "made"
+    status = "failed" if row.error else "new contact" if has_new_contact(row) else "made"
     return {
         "output": Html(f"{anchor}{name}</a>" if link else name),
         "status": status,

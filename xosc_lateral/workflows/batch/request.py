@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from lxml import etree
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError, meant_for
+from xosc_lateral.base.errors import FormatError, XoscLateralError, absent, meant_for
 from xosc_lateral.base.limits import PARAMETER_SETS, XML_TREE
 from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.provenance import HEADER_MARK
@@ -141,7 +141,7 @@ def find_requests(text: str | Path, settings: ConvertSettings, variants: int, le
         base, scenarios = _matches(str(text), leave_out.resolve())
         yield from (Request(scenario, settings, variants, base, listed=False) for scenario in scenarios)
     else:
-        raise FormatError("no such file or folder", path=text)
+        raise FormatError(absent(text), path=text)
 
 
 def read_request_table(rows: Path | pd.DataFrame, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:

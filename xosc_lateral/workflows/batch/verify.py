@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError, cut
+from xosc_lateral.base.errors import FormatError, XoscLateralError, absent, cut
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.version import BEHAVIOUR
 from xosc_lateral.files.openscenario.provenance import CONTENT_HASH_NAME, content_hash, facts_in, without_provenance
@@ -104,7 +104,7 @@ class _Origin:
         """Read it, `FormatError` if it is not one of ours; `search` says where profiles and roads are looked for."""
         facts = facts_in(data)
         if facts is None:
-            raise FormatError("has no provenance of xosc-lateral", path=output)
+            raise FormatError("has no provenance of xosc-lateral, as outputs of convert have", path=output)
         if foreign := sorted(facts.keys() - {field.name for field in fields(ConversionProvenance)}):
             raise FormatError(f"its provenance says {foreign[0][:60]!r}, which this program never writes", path=output)
         try:
@@ -321,7 +321,7 @@ def reproduce(
     """
     old = Path(output)
     if not old.exists():
-        raise FormatError("no such file or folder", path=old)
+        raise FormatError(absent(old), path=old)
     search = ConvertSettings(library=as_paths(library), allow=as_paths(allow), road_path=as_paths(road_path))
     target = output_folder(new) if old.is_dir() else output_file(new, old.name, (".xosc",))
     if target.resolve() == old.resolve():

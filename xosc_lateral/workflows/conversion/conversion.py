@@ -11,6 +11,7 @@ from msgspec import structs
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.plugins import service
+from xosc_lateral.base.texts import counted
 from xosc_lateral.drivers.model.profile import SIDES, UNMEASURED_RESPONSES, Basis
 from xosc_lateral.files.atomic import together
 from xosc_lateral.files.output_paths import claim, label_files, output_file
@@ -43,7 +44,7 @@ class Conversion(ConvertedScenario, Result):
             if entity.is_enriched and entity.profile is not None:
                 mode = self.provenance.modes.get(entity.name, "")
                 lines.append(
-                    f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
+                    f"  {entity.name}: {counted(len(entity.segments), 'segment')}, {entity.segment_seconds:.1f} s, "
                     f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
                     f"as {MODE_WORDS.get(mode, mode)}"
                 )

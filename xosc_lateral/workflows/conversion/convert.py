@@ -14,7 +14,7 @@ from typing import Unpack
 
 from msgspec import structs
 
-from xosc_lateral.base.errors import DriverProfileError, FormatError
+from xosc_lateral.base.errors import DriverProfileError, FormatError, absent
 from xosc_lateral.base.note import notes, warnings
 from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
@@ -282,7 +282,7 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
 def output_scenario(output: PathLike, source: Path) -> Path:
     """A file: as it is. A folder: the source's name in it, or `default_output`'s where that is the source itself."""
     if not exists(source):
-        raise FormatError("no such file or folder", path=source)
+        raise FormatError(absent(source), path=source)
     path = output_file(output, source.name, SCENARIO_SUFFIXES)
     is_source = path.parent.resolve() == source.parent.resolve() and path.name == source.name
     return default_output(source) if is_source and path != Path(output) else path

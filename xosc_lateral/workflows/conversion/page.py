@@ -79,8 +79,8 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         "Segments",
         "Offsets are sampled where a vehicle simply follows its road. Everywhere else the table gives the reason why "
         "not.",
+        folded=True,
     )
-    page.figure(figures.timeline(enriched), "Coloured: road-following, by entity over time. Grey: not.", over_time=True)
     rows = [
         {"entity": entity.name, "from [s]": span.start, "to [s]": span.end, "what": span.kind.value}
         for entity in enriched.entities

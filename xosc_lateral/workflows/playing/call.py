@@ -313,19 +313,17 @@ def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:
     """All segments of all entities, in the scenario's order and in order of time."""
     from xosc_lateral.world.motion.segments import SegmentRow, cut_segments
 
-    rows = []
-    for motion in played.motion.entities:
-        for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers):
-            index = int(motion.road[span.first])
-            rows.append(
-                SegmentRow(
-                    entity=motion.name,
-                    start=span.start,
-                    end=span.end,
-                    road_following=span.is_road_following,
-                    why="" if span.is_road_following else span.kind.value,
-                    road=played.network.road_ids[index] if index >= 0 else "",
-                    lane=int(motion.lane[span.first]) if index >= 0 else 0,
-                )
-            )
-    return tuple(rows)
+    return tuple(
+        SegmentRow(
+            entity=motion.name,
+            start=span.start,
+            end=span.end,
+            road_following=span.is_road_following,
+            why="" if span.is_road_following else span.kind.value,
+            road=played.network.road_ids[road] if road >= 0 else "",
+            lane=int(motion.lane[span.first]) if road >= 0 else 0,
+        )
+        for motion in played.motion.entities
+        for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers)
+        for road in [int(motion.road[span.first])]
+    )

@@ -231,21 +231,6 @@ def lane_changes_over_time(enriched: Enriched, chosen: Sequence[tuple[EntityResu
     return figure
 
 
-def timeline(enriched: Enriched) -> Figure:
-    """When each entity follows its road, and when not."""
-    count = len(enriched.entities)
-    figure = Figure(height=20.0 * count)
-    (panel,) = figure.panels
-    for number, entity in enumerate(enriched.entities):
-        for span in entity.spans:
-            color = color_of(number) if span.is_road_following else GRID
-            panel.line((span.start, span.end), (number, number), color, width=11.0, label=span.kind.value)
-    panel.y.ticks = [(number, label_of(entity.name)) for number, entity in enumerate(enriched.entities)]
-    panel.y.limits, panel.y.grid = (count - 0.5, -0.5), False
-    panel.x.label = "time [s]"
-    return figure
-
-
 # ---- The page of a played scenario, before anything is converted ----
 def view_page(
     motion: NominalMotion,

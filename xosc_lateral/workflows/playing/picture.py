@@ -56,6 +56,7 @@ class PictureScene:
         (panel,) = figure.panels
         panel.x.limits, across = (-REACH, REACH), float(self._scene["across"])
         panel.y.limits = (-across, across)
+        wider = figure.height / across * REACH / figure.width
         shown = [entity for entity in self._entities if self._is_there(entity, time)]
         if not shown:
             panel.line((-REACH, REACH), (0.0, 0.0), VERGE, label=f"nobody is there at {time:g} s")
@@ -79,6 +80,7 @@ class PictureScene:
                 around = _seen(_outline(vehicle, self._pose(vehicle, "nominal", time)), camera)
                 ghost = np.vstack([around, around[:1]])
                 panel.line(ghost[:, 0], ghost[:, 1], INK, width=1.0, dashes="3 2", label="without offsets")
+        panel.line((20.0 - REACH, -REACH), (-0.9 * across,) * 2, INK, label=f"20 m; across {wider:.1f} times as large")
         return figure
 
     def _draw_road(self, panel: Panel, camera: tuple[float, float, float]) -> None:
@@ -175,9 +177,9 @@ def write_image(
     figure = shown.picture(time)
     if output.suffix.lower() == ".svg":
         return write_atomically(output, marked(figure.svg()))
-    from xosc_lateral.files.pages.raster import raster
+    from xosc_lateral.files.pages.raster import rasters
 
-    image = raster(figure)
+    (image,) = rasters([figure])
     from PIL.PngImagePlugin import PngInfo
 
     data = BytesIO()
@@ -191,7 +193,7 @@ def write_animation(
     scene: str, path: str | Path, *, usual_name: str, inputs: Iterable[Path] = (), force: bool = False
 ) -> Path:
     """Write the whole run as ``.gif`` (extra `pictures`), in real time."""
-    from xosc_lateral.files.pages.raster import raster
+    from xosc_lateral.files.pages.raster import rasters
 
     output = output_file(path, f"{usual_name}.gif", ANIMATION_SUFFIXES)
     claim([output], inputs, force=force)
@@ -201,22 +203,14 @@ def write_animation(
         raise ValueError(
             f"an animation of {shown.end_time:.0f} s: at most {MOST_PICTURES * GIF_STEP:.0f} s; --time-limit"
         )
-    images = [raster(shown.picture(time)) for time in times]
-    size = images[0].width, max(one.height for one in images)
-    from PIL import Image
+    images = list(rasters(map(shown.picture, times)))
+    from PIL import Image, ImageOps
 
-    frames = []
-    for image in images:  # legends may have more or fewer rows
-        frame = Image.new("RGB", size, "white")
-        frame.paste(image, (0, size[1] - image.height))
-        frames.append(frame.quantize(64, dither=Image.Dither.NONE))
-    data = BytesIO()
-    more = {
-        "save_all": True,
-        "append_images": frames[1:],
-        "duration": round(1000 * GIF_STEP),
-        "loop": 0,
-        "comment": PACKAGE,
-    }
-    frames[0].save(data, "GIF", **more)
+    high = max(image.height for image in images)  # legends may have more or fewer rows
+    frames = [
+        ImageOps.expand(image, (0, high - image.height, 0, 0), "white").quantize(64, dither=Image.Dither.NONE)
+        for image in images
+    ]
+    data, step = BytesIO(), round(1000 * GIF_STEP)
+    frames[0].save(data, "GIF", save_all=True, append_images=frames[1:], duration=step, loop=0, comment=PACKAGE)
     return write_atomically(output, data.getvalue())

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.texts import counted, hours_in_words
 from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.lane_keeping import LaneKeeping, MovementSummary, figures_of
 from xosc_lateral.drivers.evaluation.metrics import free_runs
@@ -42,10 +43,11 @@ def list_text(entries: Sequence[Entry]) -> str:
     width = max((len(entry.name) for entry in entries if entry.profile is not None), default=0)
     lines = [_list_line(entry.name, entry.profile, width) for entry in entries if entry.profile is not None]
     lines += [f"! {entry.problem}" for entry in entries if entry.problem]
-    for entry in entries:
-        if entry.hidden_by is not None:
-            shipped = "the shipped profile" if entry.is_shipped else str(entry.path)
-            lines.append(f"! {entry.hidden_by} hides {shipped} {entry.name!r}")
+    lines += [
+        f"! {entry.hidden_by} hides {'the shipped profile' if entry.is_shipped else entry.path} {entry.name!r}"
+        for entry in entries
+        if entry.hidden_by is not None
+    ]
     return "\n".join(lines) or "no profiles"
 
 
@@ -171,9 +173,7 @@ def interval_note(profile: DriverProfile) -> str:
 
 def _amount(known: Provenance) -> str:
     """What a profile was fitted on: time, vehicles, runs."""
-    vehicles = "1 vehicle" if known.drives == 1 else f"{known.drives} vehicles"
-    time = f"{60 * known.hours:.1f} min" if known.hours < 1 else f"{known.hours:.2f} h"
-    return f"{time}, {vehicles}, {known.runs} runs"
+    return f"{hours_in_words(known.hours)}, {counted(known.drives, 'vehicle')}, {counted(known.runs, 'run')}"
 
 
 def _outcome(known: Provenance) -> Iterator[tuple[str, str]]:

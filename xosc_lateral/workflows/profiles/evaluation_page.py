@@ -14,11 +14,10 @@ from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.realism import Realism
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores, scores_to_dict
-from xosc_lateral.drivers.evaluation.snippets import PartEvaluation
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
-from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.realism_text import (
     FAMILY_LABELS,
@@ -61,44 +60,73 @@ def spectrum_figure(scores: ProfileScores) -> Figure:
     return figure
 
 
+def verdict_figure(verdict: spectra.Verdict) -> Figure:
+    """Ratios of powers over frequency, with intervals: of the driver, and of the recording."""
+    figure = Figure(1, 2, height=130.0, share_x="all", share_y="all")
+    powers = [ratio for ratio in verdict.ratios if ratio.high]
+    ends = min(ratio.low for ratio in powers), max(ratio.high for ratio in powers)
+    for panel, of, color in zip(figure.panels, spectra.BOTH, (SAMPLED, MEASURED), strict=True):
+        panel.title, panel.x.label, panel.x.log, panel.y.log = of, "frequency [Hz]", True, True
+        panel.x.limits = ends
+        panel.area((*ends, *ends[::-1]), (1.0 / spectra.TOLERANCE,) * 2 + (spectra.TOLERANCE,) * 2, color, opacity=0.12)
+        panel.line(ends, (1.0, 1.0), color, width=0.8, dashes="3 2")
+        for each in (ratio for ratio in powers if ratio.of == of):
+            middle = (each.low * each.high) ** 0.5
+            panel.line((middle, middle), each.interval, color)
+            panel.dots((middle,), (each.ratio,), color, size=6.0, label=f"{each.name}, {each.judged}")
+    figure.panels[0].y.label = "sampled over measured"
+    return figure
+
+
+VERDICT_SENTENCES = {
+    spectra.ALIKE: "moves as other real drivers do", spectra.UNLIKE: "does not move as other real drivers do",
+    spectra.NOT_KNOWN: "may or may not move as other real drivers do: these drives are too few to tell",
+}  # fmt: skip
+
+
+def finding(scores: ProfileScores) -> str:
+    """The verdict in a sentence, and the comparison that does worst."""
+    worst, ratio = worst_block(scores)
+    far = f"; farthest from them, {ratio:.2f} times as far as they are from each other: {worst}"
+    return f"`{scores.profile}` {VERDICT_SENTENCES[judged(scores, spectra.DRIVER)]}{far}."
+
+
 NAMED_BLOCKS = 3
 """Blocks that a verdict names."""
-GOOD_RATIO, BAD_RATIO = 1.2, 2.0
-"""Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
 Block = tuple[float, float, float, str]
 """A ratio to what other real drivers get, its 95 % interval, and of what it speaks: driver or recording."""
 
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """A table for the terminal."""
-    block, ratio = worst_block(scores)
-    lines = [
-        f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
-        *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
-        f"verdict: {verdict_in_words(scores)}",
-        scores.verdict.alarm_words(),
-        f"worst comparison: {block}, {ratio:.2f} times that between real drivers",
-        *realism_lines(scores.realism),
-        "snippets as in the paper, from the same start; real drivers are compared without a common start",
-        *_snippet_lines(scores.snippets),
-    ]
-    if note := start_fade_note(profile):
-        lines.append(f"  {note}")
-    if scores.long_snippets is not None:
-        lines += _snippet_lines(scores.long_snippets)
-    lines.append("mean distance of the four evaluations (coarse + fine):")
-    lines += [
-        f"  ({each.number}) {each.coarse} + {each.fine}: {each.distances.mean:.3f}, worst {each.distances.worst} "
-        f"{each.distances.by_metric[each.distances.worst]:.3f}"
-        for each in scores.evaluations
-    ]
-    lines.append(f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)")
-    for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled)):
-        lines.append(
-            f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, offsets up to "
-            f"{each.largest:.2f} m"
-        )
-    return "\n".join(lines)
+    note, long = start_fade_note(profile), scores.long_snippets
+    return "\n".join(
+        [
+            f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), "
+            f"seed {scores.seed}",
+            *([FITTED_NOTE] if _fitted_on(profile, inputs) else []),
+            finding(scores).replace("`", ""),
+            f"verdict: {verdict_in_words(scores)}",
+            scores.verdict.alarm_words(),
+            *realism_lines(scores.realism),
+            "snippets as in the paper, from the same start; real drivers are compared without a common start",
+            *_snippet_lines(scores.snippets),
+            *([f"  {note}"] if note else []),
+            *([] if long is None else _snippet_lines(long)),
+            "mean distance of the four evaluations (coarse + fine):",
+            *(
+                f"  ({each.number}) {each.coarse} + {each.fine}: {each.distances.mean:.3f}, worst "
+                f"{each.distances.worst} {each.distances.by_metric[each.distances.worst]:.3f}"
+                for each in scores.evaluations
+            ),
+            f"spectrum: differs by {scores.spectrum_error:.1f} dB (rms over bands)",
+            *(
+                f"comes near a marking, {name}: {each.excursions_per_hour:.1f} times an hour, "
+                f"up to {each.largest:.2f} m"
+                for name, each in (("measured", scores.margins_real), ("sampled", scores.margins_sampled))
+            ),
+        ]
+    )
 
 
 FITTED_NOTE = (
@@ -117,20 +145,22 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
     """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
     page = Page(f"Evaluation of {scores.profile}")
-    verdict = verdict_in_words(scores)
     page.lead(
-        f"{verdict[:1].upper()}{verdict[1:]}. {scores.verdict.alarm_words().capitalize()}.",
+        finding(scores),
         f"{scores.hours:.1f} h of measured driving ({scores.drives} drives), beside offsets sampled from "
         f"`{scores.profile}` under the same context. It is valid for: {profile.validity.in_words() or 'not stated'}.",
     )
-    worst, ratio = worst_block(scores)
-    worst_figure = KeyFigure(
-        f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)
-    )
-    page.key_figures([worst_figure, *_key_figures(scores.realism)])
     if _fitted_on(profile, inputs):
         page.warning(FITTED_NOTE)
-    _add_realism(page, scores.realism)
+    if any(ratio.high for ratio in scores.verdict.ratios):
+        page.figure(
+            verdict_figure(scores.verdict),
+            "Power of what is sampled over what is measured, by frequency; lines: 95 % intervals over drives. Shaded: "
+            "as far as real drivers differ from run to run. Driver: without the sensor's error; recording: with it.",
+            "Sampled over measured power by frequency, of the driver and of the recording",
+        )
+    words = verdict_in_words(scores)
+    page.text(f"{words[:1].upper()}{words[1:]}.", f"{scores.verdict.alarm_words().capitalize()}.")
     page.section("Traces")
     page.figure(
         trace_figure(scores),
@@ -138,17 +168,25 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "meant to coincide: two drives of the same driver do not either. What should agree is how they move.",
         "Measured and sampled offsets over time, drive by drive",
     )
+    _add_realism(page, scores.realism)
     page.section(
         f"Ten metrics of {scores.snippets.seconds:g} s snippets",
         "As in the paper: sampled from the same start; real drivers are compared without a common start. "
         f"{start_fade_note(profile)}",
+        folded=True,
     )
     _add_metrics(page, scores.snippets)
-    _add_violins(page, scores.evaluations[3], "Measured (left, blue) beside sampled (right) snippets.")
+    made = scores.evaluations[3]
+    page.figure(
+        violin_figure(made.real, made.artificial),
+        "Measured (left, blue) beside sampled (right) snippets. Bars: minimum, mean, maximum.",
+        f"Ten pairs of violins; mean distance {made.distances.mean:.3f}.",
+    )
     if scores.long_snippets is not None:
         page.section(
             f"Snippets of {scores.long_snippets.seconds:g} s",
             "The same metrics of longer snippets, which show slow movement.",
+            folded=True,
         )
         _add_metrics(page, scores.long_snippets)
     page.section(
@@ -156,6 +194,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Which part of the model falls short? The coarse and fine parts of measured snippets (split as in Neis and "
         "Beyerer, 2024) and those of the profile are combined. Evaluation (1) combines the measured coarse part with "
         "the measured fine part, shifted in time: the best that the split allows.",
+        folded=True,
     )
     page.table(
         [
@@ -165,9 +204,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
             for each in scores.evaluations
         ]
     )
-    for each in scores.evaluations[:3]:
-        _add_violins(page, each, f"({each.number}) Coarse part {each.coarse}, fine part {each.fine}.")
-    page.section("Spectrum and autocorrelation")
+    page.section("Spectrum and autocorrelation", folded=True)
     page.figure(
         spectrum_figure(scores),
         "Left: power spectral density of the offset. Right: autocorrelation about the mean over all drivers.",
@@ -177,6 +214,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         "Near the markings",
         f"How often the reference point comes within {NEAR_MARKING:g} m of a marking (half the width of a car, and a "
         "margin).",
+        folded=True,
     )
     page.table(
         [
@@ -203,10 +241,11 @@ def _add_realism(page: Page, realism: Realism) -> None:
         "snippets has an AUC of 0.5; in brackets, the 95 % interval over resampled drives. With context, it also sees "
         "what was around the vehicle; a column that follows from the vehicle's own movement, such as its steering "
         "angle, gives sampled movement away.",
+        folded=True,
     )
     for heading, group in condition_groups(realism).items():
         page.table(ratio_rows(group), heading)
-    page.section("Lane keeping")
+    page.section("Lane keeping", folded=True)
     formats = {"measured": ".4g", "sampled": ".4g", "distance [sd]": ".3f", "real drivers [sd]": ".3f"}
     for each in realism.conditions:
         if not each.condition.same_start:
@@ -218,14 +257,6 @@ def _add_realism(page: Page, realism: Realism) -> None:
     page.text(
         f"Variance between drivers, within drivers and inside snippets of {SNIPPET:g} s: {real} measured, "
         f"{sampled} sampled."
-    )
-
-
-def _add_violins(page: Page, each: PartEvaluation, caption: str) -> None:
-    page.figure(
-        violin_figure(each.real, each.artificial),
-        f"{caption} Bars: minimum, mean, maximum.",
-        f"Ten pairs of violins; mean distance {each.distances.mean:.3f}.",
     )
 
 
@@ -241,7 +272,6 @@ def _add_metrics(page: Page, scores: SnippetScores) -> None:
         [{"metric": name, "distance": each, "real drivers": real, "ratio": each / real} for name, each, real in rows],
         f"{scores.count} snippets of {scores.seconds:g} s; distances in standard deviations of the measured metric",
         formats={"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"},
-        tones={number: _tone(each / real) for number, (_, each, real) in enumerate(rows[:-1])},
     )
 
 
@@ -250,23 +280,6 @@ def _snippet_lines(scores: SnippetScores) -> list[str]:
         f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio",
         *(f"  {name:24s}  {each:8.3f}  {real:12.3f}  {each / real:5.2f}" for name, each, real in _metric_rows(scores)),
     ]
-
-
-def _key_figures(realism: Realism) -> list[KeyFigure]:
-    """Of the shortest free runs: how near, how well separated."""
-    figures = []
-    slow = next((each for each in realism.conditions if each.condition.slow), None)
-    free = next(
-        (each for each in realism.conditions if not each.condition.slow and not each.condition.same_start), None
-    )
-    if slow is not None:
-        ratio = slow.families["metrics"].ratio
-        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / real drivers", slow.condition.name, _tone(ratio)))
-    for each in (slow, free):
-        if each is not None and each.alone is not None:
-            what = ", with the sensor" if each.with_sensor else ""
-            figures.append(KeyFigure(f"{each.alone.auc:.2f}", "classifier AUC", f"{each.condition.name}{what}"))
-    return figures
 
 
 def blocks_of(scores: ProfileScores) -> dict[str, Block]:
@@ -305,23 +318,16 @@ def verdict_in_words(scores: ProfileScores) -> str:
     far = far_blocks(scores)
     if not far:
         return scores.verdict.in_words()
-    listed = ", ".join(
-        f"{name} {ratio:.2f} ({low:.2f} to {high:.2f}, {of})"
-        for name, (ratio, low, high, of) in list(far.items())[:NAMED_BLOCKS]
-    )
+    listed = [f"{name} {ratio:.2f} ({low:.2f} to {high:.2f}, {of})" for name, (ratio, low, high, of) in far.items()]
     more = f" and {len(far) - NAMED_BLOCKS} more" if len(far) > NAMED_BLOCKS else ""
     what = "farther from real drivers than these are from each other in"
-    return f"{scores.verdict.in_words()}; not like them: {what} {listed}{more}"
+    return f"{scores.verdict.in_words()}; not like them: {what} {', '.join(listed[:NAMED_BLOCKS])}{more}"
 
 
 def judged(scores: ProfileScores, of: str) -> str:
     """Driver or recording: alike, unlike or not known, by ratios and blocks."""
     contradicted = any(block[3] == of for block in far_blocks(scores).values())
     return spectra.UNLIKE if contradicted else scores.verdict.judged(of)
-
-
-def _tone(ratio: float) -> Tone:
-    return "good" if ratio <= GOOD_RATIO else "bad" if ratio >= BAD_RATIO else ""
 
 
 def _fitted_on(profile: DriverProfile, inputs: Mapping[str, str]) -> bool:

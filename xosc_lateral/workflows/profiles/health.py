@@ -16,6 +16,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, rows_left_out, warnings
+from xosc_lateral.base.texts import counted
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
 from xosc_lateral.files.recognised import mapping_text, recognised
@@ -134,14 +135,14 @@ class Health(Result):
         if self.read is None:
             return f"can't be read as drives: {self.wrong[0]}"
         known = self.figures
-        side = "left" if known["offset_mean_m"] > 0.0 else "right"
-        count = f"{known['drives']} drive{'s' if known['drives'] > 1 else ''}"
-        text = (
-            f"{count}, {known['road_following_h']:.2f} of {known['hours']:.2f} h road-following, "
-            f"{known['rate_hz']:.3g} Hz; {abs(known['offset_mean_m']):.2f} m {side} of the lane's centre on average, "
+        return (
+            f"{counted(known['drives'], 'drive')}, {known['road_following_h']:.2f} of {known['hours']:.2f} h "
+            f"road-following, {known['rate_hz']:.3g} Hz; {abs(known['offset_mean_m']):.2f} m "
+            f"{'left' if known['offset_mean_m'] > 0.0 else 'right'} of the lane's "
+            f"centre on average, "
             f"spread {known['offset_sd_m']:.2f} m, lanes {known['lane_width_m']:.2f} m wide"
+            + ("; as guessed: a mapping is needed" if self.is_guessed else "")
         )
-        return text + ("; as guessed: a mapping is needed" if self.is_guessed else "")
 
     def can(self) -> list[str]:
         """What can be fitted to the drives, a line each."""

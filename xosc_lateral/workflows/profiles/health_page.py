@@ -23,7 +23,7 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
     files = [Path(file) for file in facts["files"]]
     page = Page(f"What is in {files[0].name}" + (f" and {len(files) - 1} more" if len(files) > 1 else ""))
     known = facts["summary"]
-    page.lead(f"{headline}.")
+    page.lead(f"{headline}.", f"Can be fitted: {'; '.join(facts['can']) or 'nothing yet'}.")
     if known:
         lost = sum(known["left_out"].values())
         page.key_figures(
@@ -38,24 +38,22 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
         page.warning(f"{what}." + (" With what is guessed below they can be read." if facts["guessed"] else ""))
     if facts["sensor"]:
         page.text(f"{facts['sensor']}.")
-    page.section("What can be fitted")
+    if known:
+        page.figure(
+            _offsets(drives),
+            "How the offsets lie in the lane, the markings at its edges; all rows that are read.",
+            "Histogram of the offsets between the lane markings",
+        )
     cannot = [*facts["cannot"], *(one["what"] for one in facts["messages"] if one["severity"] == "warning")]
-    page.items(facts["can"] or ["Nothing yet."])
     if cannot:
-        page.heading("What not, and what is in doubt")
+        page.section("What can't be fitted, and what is in doubt")
         page.items(cannot)
     page.section("Columns", "What the headers and values were taken for; signs and units are yours to confirm.")
     page.table(facts["columns"], "Quantiles in the unit of the table.")
     if facts["others"]:
         page.text(f"Others, which are context under their own names: {', '.join(facts['others'])}.")
     if known:
-        page.section("Offsets")
-        page.figure(
-            _offsets(drives),
-            "How the offsets lie in the lane, the markings at its edges; all rows that are read.",
-            "Histogram of the offsets between the lane markings",
-        )
-        page.section("Drives")
+        page.section("Drives", folded=True)
         rows = (
             sorted(facts["drives"], key=lambda row: -row["minutes"]) if len(drives) > NAMED_DRIVES else facts["drives"]
         )
@@ -65,11 +63,12 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
             formats={"minutes": ".1f", "road-following [min]": ".1f", "mean offset [m]": ".2f", "spread [m]": ".2f"},
         )  # fmt: skip
         if known["left_out"]:
-            page.section("Rows left out")
+            page.section("Rows left out", folded=True)
             page.table([{"why": why, "rows": count} for why, count in known["left_out"].items()])
     page.section(
         "Mapping",
         "Read every line, correct it, and give the file with `--mapping`; `check` writes it with `--write-mapping`.",
+        folded=True,
     )
     page.items(f"`{line}`" for line in facts["mapping"].splitlines() if line)
     return page.html({"inputs": parsed_hashes(files)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
 from xosc_lateral.drivers.model.core.base import ModelKind
@@ -60,40 +61,34 @@ def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
 
 def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     """A row for each family and each classifier, a column for each length."""
-    rows: list[dict[str, object]] = []
-    for family, label in FAMILY_LABELS.items():
-        if any(family in each.families for each in group):
-            cells = {
-                _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
-            }
-            rows.append({"ratio to real drivers": label, **cells})
-    for key, label in AREA_LABELS.items():
-        areas = {_length(each): getattr(each, key) for each in group}
-        if any(area is not None for area in areas.values()):
-            cells = {
-                length: "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
-                for length, area in areas.items()
-            }
-            rows.append({"ratio to real drivers": label, **cells})
-    return rows
+    families = {
+        label: {
+            _length(each): f"{each.families[family].ratio:.2f}" if family in each.families else "" for each in group
+        }
+        for family, label in FAMILY_LABELS.items()
+    }
+    areas = {label: {_length(each): _area(getattr(each, key)) for each in group} for key, label in AREA_LABELS.items()}
+    return [
+        {"ratio to real drivers": label, **cells} for label, cells in (families | areas).items() if any(cells.values())
+    ]
+
+
+def _area(area: TwoSampleResult | None) -> str:
+    return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"
 
 
 def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
     """A row for each lane-keeping indicator: means, distance, that between real drivers."""
-    rows: list[dict[str, object]] = []
-    for name in INDICATORS:
-        real, sampled = scores.means[name]
-        beside = scores.named[name]
-        rows.append(
-            {
-                "indicator": INDICATOR_LABELS[name],
-                "measured": real,
-                "sampled": sampled,
-                "distance [sd]": beside.value,
-                "real drivers [sd]": beside.floor,
-            }
-        )
-    return rows
+    return [
+        {
+            "indicator": INDICATOR_LABELS[name],
+            "measured": scores.means[name][0],
+            "sampled": scores.means[name][1],
+            "distance [sd]": scores.named[name].value,
+            "real drivers [sd]": scores.named[name].floor,
+        }
+        for name in INDICATORS
+    ]
 
 
 def realism_lines(realism: Realism) -> list[str]:
@@ -104,20 +99,20 @@ def realism_lines(realism: Realism) -> list[str]:
         for row in ratio_rows(group):
             label, *cells = row.values()
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
-    if all(each.alone is None for each in realism.conditions):
-        lines.append("    classifier AUC: not computed")
+    lines += ["    classifier AUC: not computed"] * all(each.alone is None for each in realism.conditions)
     shown = next((each for each in realism.conditions if not each.condition.same_start), None)
     if shown is not None:
         lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
-        for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown)):
-            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}")
-    before, made = realism.variance_real, realism.variance_sampled
-    lines.append(
-        f"variance between drivers, within drivers, inside snippets [m²]: "
-        f"measured {before.between:.4f}, {before.within:.4f}, {before.inside:.4f}; "
-        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
+        lines += [
+            f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}"
+            for label, real, sampled, distance, floor in (row.values() for row in indicator_rows(shown))
+        ]
+    measured, sampled = (
+        f"{each.between:.4f}, {each.within:.4f}, {each.inside:.4f}"
+        for each in (realism.variance_real, realism.variance_sampled)
     )
-    return lines
+    what = "variance between drivers, within drivers, inside snippets [m²]"
+    return [*lines, f"{what}: measured {measured}; sampled {sampled}"]
 
 
 def _length(each: ConditionScores) -> str:

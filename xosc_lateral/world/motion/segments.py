@@ -248,7 +248,7 @@ def bell_time(entity: EntityMotion, crossing: Crossing) -> tuple[float, float]:
 def _why_not(entity: EntityMotion, run: Sequence[SegmentSpan], first: int, last: int, way: FloatArray) -> str:
     taken = float(entity.time[last] - entity.time[first])
     if not SHORTEST_DURATION - entity.time[1] <= taken <= LONGEST_DURATION + entity.time[1]:
-        return f"it takes {taken:.1f} s, the bell is for {SHORTEST_DURATION:g} to {LONGEST_DURATION:g} s"
+        return f"it takes {taken:.2f} s, the bell is for {SHORTEST_DURATION:g} to {LONGEST_DURATION:g} s"
     if abs(way[-1]) < 1e-3 or np.max(np.abs(way)) > 1.001 * abs(way[-1]):
         return "it leads nowhere, or beyond its end"
     begin, duration = bell_time(entity, Crossing(first, last, way, "", False))

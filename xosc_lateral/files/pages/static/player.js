@@ -110,6 +110,10 @@
       const speed = make("select", {}, ...speeds.map(([value, text]) => make("option", { value }, text)));
       speed.value = "1";
       on(speed, "change", () => (this.speed = Number(speed.value)));
+      this.pace = (way) => {
+        speed.selectedIndex = clamp(speed.selectedIndex + way, 0, speeds.length - 1);
+        this.speed = Number(speed.value);
+      };
       this.stretchBar = on(make("input", { type: "range", min: 1, max: 20, step: 0.5, value: 1, "aria-label": "Lateral stretch" }),
         "input", (bar) => this.setStretch(Number(bar.value)));
       this.stretchFace = make("output", {}, "1×");
@@ -133,7 +137,7 @@
         make("div", { class: "controls" },
           labelled("Lateral stretch", this.stretchBar, this.stretchFace), ...compared,
           make("span", { class: "group" }, button("−", "Zoom out (-)", () => this.zoom(1 / 1.3)),
-            button("+", "Zoom in (+)", () => this.zoom(1.3)), button("Whole", "Show everything (0)", () => this.showAll()))),
+            button("+", "Zoom in (+)", () => this.zoom(1.3)), button("1:1", "True proportions (1)", () => this.setStretch(1)), button("Whole", "Show everything (0)", () => this.showAll()))),
         make("div", { class: "chips" }, ...this.chips));
     }
 
@@ -455,7 +459,8 @@
         ArrowUp: () => this.setStretch(this.stretch + 1), ArrowDown: () => this.setStretch(this.stretch - 1),
         Home: () => clock.set(0), End: () => clock.set(clock.end),
         "+": () => this.zoom(1.3), "=": () => this.zoom(1.3), "-": () => this.zoom(1 / 1.3),
-        0: () => this.showAll(), f: next, F: next,
+        0: () => this.showAll(), 1: () => this.setStretch(1), f: next, F: next,
+        "<": () => this.pace(-1), ",": () => this.pace(-1), ">": () => this.pace(1), ".": () => this.pace(1),
       }[event.key];
       if (!action) return;
       event.preventDefault();
