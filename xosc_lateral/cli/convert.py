@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, warn, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
@@ -85,12 +85,6 @@ def convert(
     _convert_batch(scenario, output, options, reply)
 
 
-def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
-    """Quiet, too: an output that ends before its scenario does is not what was asked for."""
-    if unsaid and result.cut_off is not None:
-        warn([result.cut_off])
-
-
 def _refuse_together(settings: Mapping[str, Any]) -> None:
     """Settings that can be had alone, but not with each other."""
     try:
@@ -139,7 +133,6 @@ def _convert_one(
         result = limited(None, report=report)
         write_stdout(result.data)
         reply.say(result, err=True)
-        _warn_if_cut_off(result, reply.quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
         here = Path(source.name) if address(source) else source
@@ -168,7 +161,8 @@ def _convert_one(
                 if its_summary is not None:
                     result.write_summary(its_summary, force=True)
             reply.say(result)
-            _warn_if_cut_off(result, reply.quiet or reply.as_json)
+            if reply.as_json and result.cut_off is not None:
+                reply.warn([result.cut_off])
             unclean |= bool(result.warnings) or not result.enriched
     if options["strict"] and unclean:
         raise typer.Exit(1)
@@ -196,8 +190,8 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
         say(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
-    if result.cut_off and (reply.quiet or reply.as_json):
-        warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
+    if result.cut_off and reply.as_json:
+        reply.warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
     if result.failed or (options["strict"] and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)
 

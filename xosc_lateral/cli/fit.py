@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Strict, Tables, Written, command, refuse_warnings, warn, write_stdout
+from xosc_lateral.cli.words import Options, Strict, Tables, Written, command, refuse_warnings, write_stdout
 
 # What is said of one option stays together.
 # fmt: off
@@ -70,7 +70,7 @@ def fit(
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
     warned = [*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))]
-    warn(warned)
+    reply.warn(warned)
     refuse_warnings(warned, strict)
 
 
@@ -98,7 +98,7 @@ def sample(
     else:
         written = made.write(output, force=reply.force)
         reply.say_words(f"{made.headline()} in {written}", {"output": str(written), **made.to_dict()})
-    warn(made.warnings)
+    reply.warn(made.warnings)
     refuse_warnings(made.warnings, strict)
 
 

@@ -25,7 +25,6 @@ from xosc_lateral.cli.words import (
     refuse_warnings,
     say,
     say_json,
-    warn,
     write_stdout,
 )
 from xosc_lateral.files.source import changes
@@ -80,7 +79,7 @@ def states(
     elif not reply.quiet:
         for note in played.notes:
             say(note, err=True)
-    warn(played.warnings)
+    reply.warn(played.warnings)
     refuse_warnings(played.warnings, options["strict"])
 
 
@@ -92,8 +91,8 @@ def segments(
     played = _played(scenario, options)
     listed = xl.segments(played)
     reply.say(listed)
-    if reply.as_json or reply.quiet:
-        warn(listed.warnings)
+    if reply.as_json:
+        reply.warn(listed.warnings)
     refuse_warnings(listed.warnings, options["strict"])
 
 
@@ -131,7 +130,7 @@ def view(
                 written += [] if image is None else [played.write_image(image, at, force=force)]
             with naming_option("--animation"):
                 written += [] if animation is None else [played.write_animation(animation, force=force)]
-        warn(played.warnings)
+        Printing(quiet).warn(played.warnings)
         for path in written if not quiet else ():
             if path is not None:
                 say(path)

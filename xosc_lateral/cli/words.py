@@ -103,12 +103,6 @@ def say(text: object, *, err: bool = False) -> None:
     typer.echo(in_terminal(str(text)), err=err)
 
 
-def warn(lines: Iterable[str]) -> None:
-    """Say on standard error what has to be known whatever was asked to be kept quiet."""
-    for line in lines:
-        say(f"xosc-lateral: warning: {line}", err=True)
-
-
 def say_json(values: Any) -> None:
     """One line of JSON on standard output."""
     typer.echo(in_json(values))
@@ -160,6 +154,11 @@ class Printing:
             say_json(result.to_dict())
         elif even or not self.quiet:
             say(result, err=err)
+
+    def warn(self, lines: Iterable[str]) -> None:
+        """Say on standard error what the result's own words, which are not printed, would say."""
+        for line in () if self.quiet else lines:
+            say(f"xosc-lateral: warning: {line}", err=True)
 
     def say_words(self, words: str, values: Any, *, err: bool = True) -> None:
         """Words, on standard error for what is no output; or, where there are any, values as JSON."""

@@ -23,7 +23,6 @@ from xosc_lateral.cli.words import (
     command,
     refuse_warnings,
     say,
-    warn,
 )
 from xosc_lateral.workflows.options import Paths
 
@@ -63,7 +62,7 @@ class Outputs:
                 run.write(table, force=reply.force)
             if trace is not None:
                 run.write_osi(trace, force=reply.force)
-        warn(run.warnings)
+        reply.warn(run.warnings)
         reply.say(run)
         refuse_warnings(run.warnings, self.strict)
 
