@@ -20,7 +20,7 @@ from xosc_lateral.drivers.fitting.regression import clustered_least_squares, sma
 from xosc_lateral.extras.loop import terms
 from xosc_lateral.extras.loop.core_model import MIN_DRIVES
 from xosc_lateral.extras.loop.dictionary import Search
-from xosc_lateral.extras.loop.model import Fitted, Stage, Term, design_of, fit_model
+from xosc_lateral.extras.loop.model import Fitted, Outcome, Stage, Term, design_of, fit_model
 from xosc_lateral.extras.loop.significance import BUDGET
 from xosc_lateral.extras.loop.terms.column import ColumnTerm
 
@@ -145,7 +145,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 component = kind.component
                 search.progress(f"looking at {component.replace('_', ' ')}")
                 try:
-                    test = kind.test(search, fitted)
+                    test = _tested(search, kind, fitted)
                 except UNFORESEEN as error:
                     seen_at[component] = len(accepted)
                     rejected[component] = Rejected(component, (), 1.0, failed("its test", error))
@@ -185,6 +185,14 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
     return selection.without(undone, UNDONE)
 
 
+def _tested(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
+    """A test's outcome; one that is known already, unless a part of a table, which need not be sure, may take more."""
+    known: Outcome | None = search.tested.get((kind, fitted.terms))
+    if known is None or known.unsure or (known.term is None and kind.passes(search, known.p_value, fitted)):
+        known = search.tested[kind, fitted.terms] = kind.test(search, fitted)
+    return known
+
+
 def failed(what: str, error: Exception) -> str:
     """Why a finding is given up where the program is wrong; the log gets where."""
     getLogger(__name__).error("%s failed", what, exc_info=error)
@@ -194,9 +202,9 @@ def failed(what: str, error: Exception) -> str:
 def _that_can_be_told(selection: Selection) -> Selection:
     """Less what can't be sized or described: one faulty effect must not cost the others."""
     for accepted in selection.accepted:
-        alone = fit_model(selection.final.coarse, [*selection.start.terms, accepted.term])
+        final = selection.final
         try:
-            accepted.term.describe(alone, alone.effects_of(accepted.term), "")
+            accepted.term.describe(final, final.effects_of(accepted.term), "")
         except UNFORESEEN as error:
             selection = selection.without([accepted.term], failed("its description", error))
     return selection

@@ -89,18 +89,15 @@ def _of_columns(search: Search, fitted: Fitted, kind: type[SearchedTerm]) -> Ite
         clipped = np.minimum(squares.values, CLIP)[squares.valid]
         unit = 0.5 * float(clipped.std() / max(float(clipped.mean()), 1e-300))
     left = beside(known, problem.observed)
-    noise, compact = unit * float(left.std()), problem.whitener.compact
-    seconds = np.flatnonzero(problem.whitener.valid)
+    noise = unit * float(left.std())
     named = {name for term in of_kind(fitted, kind) for name in term.columns}
     entries: dict[str, list[tuple[float, float, float]]] = {}
     for index, candidate in enumerate(search.quantities.candidates):
         if candidate.family is not Family.PLAIN:
             continue
         for response_s, lags in TIMINGS.items():
-            response = search.quantities.responses(np.array([index]), response_s)
-            for lag in lags:
-                moved = response[np.clip(seconds - lag, 0, len(response) - 1)].astype(np.float64)
-                rows = compact.rows(moved)[:, 0]
+            response = search.quantities.responses(np.array([index]), response_s).astype(np.float64)
+            for moved, (rows,) in ((moved, rows.T) for moved, rows in problem.whitener.at_lags(response, lags)):
                 if float(rows @ rows) <= 1e-9 * float(np.square(moved).sum()):  # constant within drives
                     continue
                 rows = beside(known, rows)
