@@ -133,9 +133,7 @@ def name_time_beside(search: Search, selection: Selection) -> Selection:
         by_time = fit_model(search.coarse, (*without.terms, test.term))
         if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
             term = replace(before, alike=(*before.alike, ("time",)))
-            accepted = tuple(replace(other, term=term) if other is finding else other for other in selection.accepted)
-            terms = [term if other is before else other for other in selection.final.terms]
-            selection = replace(selection, accepted=accepted, final=fit_model(search.coarse, terms))
+            selection = selection.exchanged(before, term)
     return selection
 
 

@@ -134,7 +134,7 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
     rows = [
         ("valid", profile.validity.in_words()),
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
-        *(("effect", effect_line(effect)) for effect in profile.effects),
+        *(("effect", effect_line(effect, profile.effects)) for effect in profile.effects),
         ("neighbours", profile.responses_in_words()),
         ("maneuvers", "" if profile.maneuvers is None else profile.maneuvers.in_words()),
         ("mean", f"{keeping.line('mean', 'm')}, {_side(keeping)} of the lane centre"),

@@ -119,7 +119,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "model": each.profile.model.kind,
                 **figures_record(each.summary, each.keeping),
                 "look": each.profile.provenance.fit.get("look"),
-                "effects": [effect_line(effect) for effect in each.profile.effects],
+                "effects": [effect_line(effect, each.profile.effects) for effect in each.profile.effects],
             }
             for each in compared.profiles
         ],

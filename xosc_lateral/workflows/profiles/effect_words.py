@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -84,10 +84,10 @@ def timing_words(lag_s: float, response_s: float) -> str:
     return f"begins {begins}, response time {response_s:.1f} s"
 
 
-def effect_line(effect: Effect) -> str:
-    """An effect in a line: what it changes, by how much and between which ends; a hidden one by its parameters."""
+def effect_line(effect: Effect, profile: Iterable[Effect] = ()) -> str:
+    """An effect of a profile in a line: what it changes, how much and between which ends; a hidden one's parameters."""
     if isinstance(effect, ColumnEffect):
-        ends = None if effect.course else ends_of(effect)
+        ends = None if effect.course else ends_of(effect, profile)
         size = ""
         if ends is not None:
             size = f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
