@@ -189,7 +189,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             selection = _tested_again(search, selection, candidate)
         except UNFORESEEN as error:
             selection = selection.without([candidate.term], failed("its second test", error))
-    selection = _beside_products(_that_can_be_told(selection))
+    selection = beside_products(_that_can_be_told(selection))
     undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
     return selection.without(undone, UNDONE)
 
@@ -223,7 +223,7 @@ def _that_can_be_told(selection: Selection) -> Selection:
     return selection
 
 
-def _beside_products(selection: Selection) -> Selection:
+def beside_products(selection: Selection) -> Selection:
     """Less what a column does alone that is within its error of nothing beside its product (Nelder 1977): the product's
     space holds the column's own effect, so it is sized beside it, not searched for again.
 
