@@ -1,9 +1,9 @@
 """Whether `close-loop` finds four of five effects of the size that it states, by planting: what sets `SIZE_MARGIN`.
 
-`python -m laboratory.loop_power [TABLES] [--seed N]`: of so many tables of six drives of five minutes each column's smallest size
-is read as the loop states it. Then an effect of this size, and of half of it, is planted into another movement under
-the same columns, alone and three at once, by a driver who responds within two to four seconds, and the stage that is to
-find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a third.
+`python -m laboratory.loop_power [TABLES] [--seed N]`: of so many tables of six drives of five minutes each column's
+smallest size is read as the loop states it. Then an effect of this size, and of half of it, is planted into another
+movement under the same columns, alone and three at once, by a driver who responds within two to four seconds, and the
+stage that is to find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a third.
 """
 
 from __future__ import annotations
@@ -72,10 +72,10 @@ def response_of(context: Mapping[str, FloatArray], column: str, response_s: floa
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], quantity))
 
 
-def tables(number: int, first: int) -> Iterator[tuple[Coarse, Coarse, dict[str, FloatArray], np.random.Generator]]:
+def tables(number: int, start: int) -> Iterator[tuple[Coarse, Coarse, dict[str, FloatArray], np.random.Generator]]:
     """Drives without an effect, other drives under the same columns, those, and what draws timings."""
     for seed in range(number):
-        rng = np.random.default_rng(first + seed)
+        rng = np.random.default_rng(start + seed)
         parts = [context_of(rng) for _ in range(DRIVES)]
         columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         first, second = (np.concatenate([moved(rng) for _ in range(DRIVES)]) for _ in range(2))

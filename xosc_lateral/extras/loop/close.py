@@ -66,10 +66,10 @@ def describe_finding(
     accepted: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut
 ) -> Finding:
     """Put sizes and errors to what was accepted."""
-    term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
+    term = accepted.term
     about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
     described = agreeing(term.describe(fitted, effects, key), term.kind, accepted.p_value)
-    return _finding(described, scored, **about, **evidence)
+    return _finding(described, scored, p_value=accepted.p_value, gain=accepted.gain, **about)
 
 
 def agreeing(described: Description, kind: str, p_value: float) -> Description:

@@ -221,11 +221,10 @@ class ColumnSearch:
         return self.fitted.coarse.response(effect), p_value
 
     def _scored_once(self) -> _Scored | None:
-        def make() -> _Scored | None:
-            taken = {term.columns for term in of_kind(self.fitted, self.kind)}
-            return self._scored(self.kind.problem(self.fitted), refused=taken)
-
-        scored: _Scored | None = self.search.once(self.kind, self.fitted, make)
+        taken = {term.columns for term in of_kind(self.fitted, self.kind)}
+        scored: _Scored | None = self.search.once(
+            self.kind, self.fitted, lambda: self._scored(self.kind.problem(self.fitted), refused=taken)
+        )
         return scored
 
     def _scored(

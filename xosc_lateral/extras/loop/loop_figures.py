@@ -1,4 +1,4 @@
-"""Figures of a closed loop: residual by context, effect curves, hidden effects over time, traces, spectra, violins."""
+"""Figures of a closed loop: residual by context, effect curves, hidden effects over time, spectra, violins."""
 
 from __future__ import annotations
 
@@ -146,22 +146,6 @@ def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
 
 
 # ---- movement ----
-def traces_figure(result: LoopResult) -> Figure:
-    """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
-    timeline, scored = result.coarse.timeline, result.scored
-    parts = loop_curves.longest_parts(result)
-    figure = Figure(len(parts), 3, height=54.0, share_x="all", share_y="all")
-    offsets = (timeline.offset, scored.runs_before[0], scored.runs_after[0])
-    for number, rows in enumerate(parts):
-        name = timeline.names[timeline.drive[rows.start]]
-        for panel, offset, (_, color, label) in zip(figure.row(number), offsets, _three(result), strict=True):
-            panel.level()
-            panel.line(timeline.time[rows] - timeline.time[rows.start], offset[rows], color, label=label)
-            panel.title, panel.x.label = f"{name}, {label}", "time [s]"
-    figure.row(len(parts) // 2)[0].y.label = "offset [m]"
-    return figure
-
-
 def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
     """Power density of measured offsets and of both profiles' held-out runs."""
     figure = Figure(height=170.0, legend=True)

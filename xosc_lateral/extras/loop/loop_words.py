@@ -153,16 +153,23 @@ def p_value_words(p_value: float) -> str:
 
 def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
-    hidden = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
-    usual = " What counts is the mean of each drive, not changes within a drive."
-    whole_drives = bool(finding.columns) and finding.lag_s is None and not finding.over_time
+    words = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
     sentence = finding_sentence(finding)
-    return (
-        f"{'' if finding.columns else f'{hidden} '}{sentence[0].upper()}{sentence[1:]}.{usual if whole_drives else ''} "
-        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}). "
-        f"Error of the {_PLAIN_GROUPS.get(finding.statistic, finding.measure)} on held-out blocks: "
-        f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now."
+    return " ".join(
+        [
+            *([] if finding.columns or not words else [words]),
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            *(["It goes by the mean of each drive, not by changes within one."] if _of_whole_drives(finding) else []),
+            f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
+            f"Where nothing was fitted, the profile's {_PLAIN_GROUPS.get(finding.statistic, finding.measure)} was off "
+            f"by {_mm(finding.error_before)} before, and is by {_mm(finding.error_after)} now.",
+        ]
     )
+
+
+def _of_whole_drives(finding: Finding) -> bool:
+    """Whether it is told by what differs between drives."""
+    return bool(finding.columns) and finding.lag_s is None and not finding.over_time
 
 
 def others_words(finding: Finding) -> str:
@@ -221,7 +228,8 @@ def outcome(result: LoopResult) -> str:
     findings, back = result.findings, result.identified.taken_back
     words = []
     if findings:
-        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in findings)
+        names = "; ".join(finding.effect for finding in findings)
+        names += f" ({size_words(findings[0])})" if len(findings) == 1 else ""
         words.append(f"{len(findings)} effect{'s' * (len(findings) > 1)} found and added to the profile: {names}.")
     elif not back:
         words.append("No significant effect was found, and none was added.")
@@ -253,15 +261,6 @@ def verdict(result: LoopResult) -> str:
     )
     unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
     return f"{words} {unseen} {shown_words(result.shown)}"
-
-
-def group_words(name: str, result: LoopResult) -> str:
-    """A group of cells as a reader would call it."""
-    for finding in result.findings:
-        key = finding.statistic.partition(" by effect: ")[2]
-        if key and name.endswith(f" by effect: {key}"):
-            return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
-    return _PLAIN_GROUPS.get(name, name)
 
 
 def _mm(value: float) -> str:

@@ -42,12 +42,6 @@ class Passage:
         """The farthest that the car goes, to the left, and its standard error. [m]"""
         return float(self.path[self.at]), float(self.error[self.at])
 
-    @property
-    def share_of_error(self) -> float:
-        """Of the farthest. [-]"""
-        size, error = self.largest_shift
-        return error / max(abs(size), 1e-12)
-
 
 def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
     """From a column's median to its farther outer quantile, or from none to it, as long and steep as usual."""

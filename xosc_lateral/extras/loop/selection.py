@@ -167,8 +167,10 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
                     if (own_way := test.own_way) is not None:
-                        why = f"it changes within drives (p = {own_way:.1e}), in each in its own way"
-                        why = f"{why}, which no profile knows"
+                        why = (
+                            f"it changes within drives (p = {own_way:.1e}), in each in its own way, which no profile "
+                            "knows"
+                        )
                     rejected[component] = Rejected(
                         component, test.columns, test.p_value, why, own_way=own_way is not None
                     )
@@ -232,10 +234,10 @@ def beside_products(selection: Selection) -> Selection:
     coarse = selection.final.coarse
     for term in [one.term for one in selection.accepted if isinstance(one.term, ColumnTerm)]:
         if isinstance(term.effect, Product):
-            alone = {one.term.columns for one in selection.accepted if one.term.kind == term.kind}
+            single = {one.term.columns for one in selection.accepted if one.term.kind == term.kind}
             centred = tuple(
                 structs.replace(factor, at=float(np.nanmedian(coarse.context[factor.column][coarse.timeline.valid])))
-                if factor.form is Form.VALUE and factor.at and (other.column,) in alone
+                if factor.form is Form.VALUE and factor.at and (other.column,) in single
                 else factor
                 for factor, other in zip(term.effect.factors, reversed(term.effect.factors), strict=True)
             )

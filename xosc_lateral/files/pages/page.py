@@ -89,6 +89,7 @@ class Page:
         self._main: list[str] = []
         self._contents: list[tuple[str, str]] = []
         self._scripts: list[str] = []
+        self._folded = False
 
     def lead(self, *paragraphs: str) -> None:
         """Add to what stands above everything."""
@@ -103,11 +104,14 @@ class Page:
         """Add a warning to the lead."""
         self._lead.append(f'<div class="warning" role="note"><strong>Warning</strong>{inline(text)}</div>')
 
-    def section(self, title: str, *paragraphs: str) -> None:
-        """Begin a section; it appears in the table of contents."""
+    def section(self, title: str, *paragraphs: str, folded: bool = False) -> None:
+        """Begin a section; it appears in the table of contents; `folded`: who wants to read it unfolds it."""
         anchor = f"s{len(self._contents) + 1}"
         self._contents.append((anchor, title))
-        self._main.append(f'<h2 id="{anchor}">{inline(title)}</h2>')
+        heading = f'<h2 id="{anchor}">{inline(title)}</h2>'
+        self._main += ["</details>"] * self._folded
+        self._main.append(f'<details class="section"><summary>{heading}</summary>' if folded else heading)
+        self._folded = folded
         self.text(*paragraphs)
 
     def heading(self, title: str, *, anchor: str = "") -> None:
@@ -197,6 +201,7 @@ class Page:
                 *self._lead,
                 f"</header>\n{nav}\n<main>",
                 *self._main,
+                "</details>" * self._folded,
                 f"</main>\n<footer>Made by xosc-lateral {__version__}.{facts}</footer>\n</div>",
                 *(f"<script>{script}</script>" for script in scripts),
                 "</body>\n</html>\n",

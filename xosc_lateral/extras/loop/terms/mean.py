@@ -266,7 +266,7 @@ class CourseTerm(MeanTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """One effect with a course; its weights' error as that of what they do in a typical passage."""
         sizes, covariance = self._weights(fitted)
-        weights = KERNELS.T @ sizes
+        weights, (size, error) = KERNELS.T @ sizes, self._passage(fitted, sizes, covariance).largest_shift
         total = max(float(np.abs(weights).sum()), 1e-300)
         course = tuple((float(late), float(one / total)) for late, one in zip(SECONDS, weights, strict=True))
         sized = structs.replace(self.effect, course=course, response_range=())
@@ -275,7 +275,7 @@ class CourseTerm(MeanTerm):
             sized,
             acts=Acts.LOCATION,
             coefficients=tuple(total * np.asarray(self.mix)),
-            errors=tuple(total * np.abs(self.mix) * self._passage(fitted, sizes, covariance).share_of_error),
+            errors=tuple(total * np.abs(self.mix) * error / max(abs(size), 1e-12)),
             reference=tuple(response.mean(axis=0)),
             response_range=tuple(zip(response.min(axis=0).tolist(), response.max(axis=0).tolist(), strict=True)),
             driven=driven_values(fitted.coarse, self.columns),
