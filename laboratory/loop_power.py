@@ -3,7 +3,8 @@
 `python -m laboratory.loop_power [TABLES] [--seed N]`: of so many tables of six drives of five minutes each column's
 smallest size is read as the loop states it. Then an effect of this size, and of half of it, is planted into another
 movement under the same columns, alone and three at once, by a driver who responds within two to four seconds, and the
-stage that is to find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a third.
+stage that is to find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a
+third.
 """
 
 from __future__ import annotations

@@ -52,9 +52,9 @@ _PLAIN_GROUPS: Mapping[str, str] = {
     "mean by effect: step 0": "mean before and after it",
 }
 
-# Of each kind of finding without a column its size, with its error, and what it means.
+# Of each kind of finding without a column its size, with its error, empty: a shift; and what it means.
 KINDS: Mapping[str, tuple[str, str]] = {
-    "location": (f"{{0:+.2f}}{{1}}{GAP}m", ""),
+    "location": ("", ""),
     "scale": (
         f"factor{GAP}{{0:.2f}}{{1}}",
         "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
@@ -64,12 +64,12 @@ KINDS: Mapping[str, tuple[str, str]] = {
         "The car oscillates at a steady frequency, whatever the road and the traffic do.",
     ),
     "drift": (
-        f"{{0:+.2f}}{{1}}{GAP}m",
+        "",
         "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
         "camera whose calibration depends on temperature.",
     ),
     "step": (
-        f"{{0:+.2f}}{{1}}{GAP}m",
+        "",
         "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
         "recalibrated camera, for example, or a change of driver.",
     ),
@@ -115,7 +115,8 @@ def size_words(finding: Finding) -> str:
     effect, ends = finding.effects[0] if finding.effects else None, finding.ends
     if ends is None or not isinstance(effect, ColumnEffect):
         about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
-        return KINDS[finding.kind][0].format(finding.size_m, about)
+        shift = change_words(Acts.LOCATION, finding.size_m, finding.size_error)
+        return KINDS[finding.kind][0].format(finding.size_m, about) or shift
     if finding.passage is not None and finding.over_time:
         return _passage_words(finding.passage, finding.columns[0])
     change, error = finding.size_m, finding.size_error
@@ -154,22 +155,19 @@ def p_value_words(p_value: float) -> str:
 def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
     words = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
-    sentence = finding_sentence(finding)
+    sentence, whole_drives = finding_sentence(finding), finding.columns and finding.lag_s is None
+    usual = "It goes by the mean of each drive, not by changes within one."
+    compared = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
     return " ".join(
         [
             *([] if finding.columns or not words else [words]),
             f"{sentence[0].upper()}{sentence[1:]}.",
-            *(["It goes by the mean of each drive, not by changes within one."] if _of_whole_drives(finding) else []),
+            *([usual] if whole_drives and not finding.over_time else []),
             f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
-            f"Where nothing was fitted, the profile's {_PLAIN_GROUPS.get(finding.statistic, finding.measure)} was off "
-            f"by {_mm(finding.error_before)} before, and is by {_mm(finding.error_after)} now.",
+            f"On stretches that nothing was fitted to, the profile was {_mm(finding.error_before)} off before, and is "
+            f"{_mm(finding.error_after)} off now ({compared}).",
         ]
     )
-
-
-def _of_whole_drives(finding: Finding) -> bool:
-    """Whether it is told by what differs between drives."""
-    return bool(finding.columns) and finding.lag_s is None and not finding.over_time
 
 
 def others_words(finding: Finding) -> str:

@@ -75,7 +75,7 @@ def elsewhere_words(acts: Acts, ends: Ends) -> str:
 
 
 def _value(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.3g}"
+    return "none" if np.isnan(value) else f"{value:.3g}" if abs(value) < 1000.0 else format_value(value)
 
 
 def timing_words(lag_s: float, response_s: float) -> str:

@@ -64,7 +64,7 @@ class ColumnTerm(Term):
             size_m=size,
             size_error=ends.error * (1.0 if on_mean else size),
             statistic=f"{self.group} by effect: {key}",
-            measure=f"{'mean offset' if on_mean else 'spread'} by fifths of what it does",
+            measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect",
             lag_s=effect.lag_s,
             response_s=effect.response_s,
             ends=ends,
