@@ -201,7 +201,7 @@ class Page:
                 *self._lead,
                 f"</header>\n{nav}\n<main>",
                 *self._main,
-                "</details>" * self._folded,
+                *["</details>"] * self._folded,
                 f"</main>\n<footer>Made by xosc-lateral {__version__}.{facts}</footer>\n</div>",
                 *(f"<script>{script}</script>" for script in scripts),
                 "</body>\n</html>\n",
