@@ -49,11 +49,6 @@ class Finding(Description):
     effects: tuple[Effect, ...] = ()  # What the profile got.
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
-    @property
-    def over_time(self) -> bool:
-        """Whether it is a course over time, which one delay does not describe."""
-        return self.passage is not None and self.lag_s is None
-
 
 def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
     """Put errors on held-out blocks to what was described."""

@@ -92,17 +92,16 @@ def _short(value: float) -> str:
 
 
 def effect_figure(result: LoopResult, finding: Finding) -> Figure:
-    """The path in a typical passage, an effect's curve over measured points, and what held-out blocks show."""
+    """A course's path in a typical passage, or an effect's curve over measured points; what held-out blocks show."""
     effect = finding.effects[0]
     assert isinstance(effect, ColumnEffect)
-    curve = not finding.over_time  # a course has no gain that a curve would show
-    figure = Figure(1, 1 + curve + (finding.passage is not None), height=180.0, legend=True)
-    panels = iter(figure.panels)
-    if finding.passage is not None:
-        _draw_passage(next(panels), finding.passage, effect.columns[0])
-    if curve:
-        _draw_curve(next(panels), result, effect)
-    held_out, on_mean = next(panels), effect.acts is Acts.LOCATION
+    figure = Figure(1, 2, height=180.0, legend=True)
+    shown, held_out = figure.panels
+    if finding.passage is not None:  # a course has no gain that a curve would show
+        _draw_passage(shown, finding.passage, effect.columns[0])
+    else:
+        _draw_curve(shown, result, effect)
+    on_mean = effect.acts is Acts.LOCATION
     bins = result.scored.statistics.middles[finding.statistic.split(" by ", 1)[1]]
     bins = bins if on_mean else np.exp(bins)
     for values, color, label in _three(result):

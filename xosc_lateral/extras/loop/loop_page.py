@@ -100,9 +100,9 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         elif finding.statistic in result.scored.real:
             page.figure(
                 loop_figures.effect_figure(result, finding),
-                "Path: where the effect puts the car while its column goes from its usual value to a high one and "
-                "back. Effect: as fitted, over what was measured less everything else that is known. Bars and bands: "
-                "two standard errors. Right: where nothing was fitted, measured and both profiles, by the effect.",
+                "Left: the effect as fitted, over what was measured less everything else that is known; or where a "
+                "course over time puts the car while its column goes from its usual value to a high one and back. Bars "
+                "and bands: two standard errors. Right: where nothing was fitted, measured and both profiles.",
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
     if proofs:

@@ -117,7 +117,7 @@ def size_words(finding: Finding) -> str:
         about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
         shift = change_words(Acts.LOCATION, finding.size_m, finding.size_error)
         return KINDS[finding.kind][0].format(finding.size_m, about) or shift
-    if finding.passage is not None and finding.over_time:
+    if finding.passage is not None:
         return _passage_words(finding.passage, finding.columns[0])
     change, error = finding.size_m, finding.size_error
     if effect.acts is not Acts.LOCATION:
@@ -162,7 +162,7 @@ def meaning(finding: Finding) -> str:
         [
             *([] if finding.columns or not words else [words]),
             f"{sentence[0].upper()}{sentence[1:]}.",
-            *([usual] if whole_drives and not finding.over_time else []),
+            *([usual] if whole_drives and finding.passage is None else []),
             f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
             f"On stretches that nothing was fitted to, the profile was {_mm(finding.error_before)} off before, and is "
             f"{_mm(finding.error_after)} off now ({compared}).",
