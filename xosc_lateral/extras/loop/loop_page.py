@@ -100,9 +100,14 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         elif finding.statistic in result.scored.real:
             page.figure(
                 loop_figures.effect_figure(result, finding),
-                "Left: the effect as fitted, over what was measured less everything else that is known; or where a "
-                "course over time puts the car while its column goes from its usual value to a high one and back. Bars "
-                "and bands: two standard errors. Right: where nothing was fitted, measured and both profiles.",
+                (
+                    "Left: the effect as fitted, and what was measured less all else that is known."
+                    if finding.passage is None
+                    else "Left: where the effect puts the car while its column goes from its usual value to a high one "
+                    "and back."
+                )
+                + " Bars and bands: two standard errors. Right: measured, and both profiles, on stretches "
+                "that nothing was fitted to.",
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
     if proofs:

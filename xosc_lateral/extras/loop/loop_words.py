@@ -139,7 +139,8 @@ def _passage_words(passage: Passage, column: str) -> str:
         if not sides or abs(size) > error:
             when = f"{abs(moment):.0f}{GAP}s {'before' if moment < 0 else 'after'} it begins"
             sides.append(f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m further {side_of(size)} {when}")
-    usual = f"{passage.usual:.3g}" if np.isfinite(passage.usual) else "none"
+    none = np.isnan(passage.usual)
+    usual = "none" if none else f"{passage.usual:.3g}" if abs(passage.usual) > 1e-3 * abs(passage.high) else "0"
     hint = f"; {HINTS[column]}" if column in HINTS else ""
     goes = f"`{column}` from {usual} to {passage.high:.3g} {plain_unit(column)}".rstrip()
     return f"{', '.join(sides)} in a typical passage ({goes} for {passage.lasts_s:.0f}{GAP}s{hint})"

@@ -109,8 +109,8 @@ class Page:
         anchor = f"s{len(self._contents) + 1}"
         self._contents.append((anchor, title))
         heading = f'<h2 id="{anchor}">{inline(title)}</h2>'
-        self._main += ["</details>"] * self._folded
-        self._main.append(f'<details class="section"><summary>{heading}</summary>' if folded else heading)
+        begins = f'<details class="section"><summary>{heading}</summary>' if folded else heading
+        self._main += [*["</details>"] * self._folded, begins]
         self._folded = folded
         self.text(*paragraphs)
 

@@ -90,9 +90,11 @@ def effect_line(effect: Effect, profile: Iterable[Effect] = ()) -> str:
         ends = None if effect.course else ends_of(effect, profile)
         size = ""
         if ends is not None:
-            size = f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
-            size += f"{elsewhere_words(effect.acts, ends)};"
-            size += f" drivers differ by {ends.scatter / abs(ends.change):.0%} of it;" if ends.scatter else ""
+            size = (
+                f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
+                f"{elsewhere_words(effect.acts, ends)};"
+                + (f" drivers differ by {ends.scatter / abs(ends.change):.0%} of it;" if ends.scatter else "")
+            )
         timing = "a course over time" if effect.course else timing_words(effect.lag_s, effect.response_time)
         return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)}:{size} {timing}; {effect.shape}"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}

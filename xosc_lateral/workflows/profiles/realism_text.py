@@ -80,20 +80,16 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
 
 def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
     """A row for each lane-keeping indicator: means, distance, that between real drivers."""
-    rows: list[dict[str, object]] = []
-    for name in INDICATORS:
-        real, sampled = scores.means[name]
-        beside = scores.named[name]
-        rows.append(
-            {
-                "indicator": INDICATOR_LABELS[name],
-                "measured": real,
-                "sampled": sampled,
-                "distance [sd]": beside.value,
-                "real drivers [sd]": beside.floor,
-            }
-        )
-    return rows
+    return [
+        {
+            "indicator": INDICATOR_LABELS[name],
+            "measured": scores.means[name][0],
+            "sampled": scores.means[name][1],
+            "distance [sd]": scores.named[name].value,
+            "real drivers [sd]": scores.named[name].floor,
+        }
+        for name in INDICATORS
+    ]
 
 
 def realism_lines(realism: Realism) -> list[str]:

@@ -41,8 +41,7 @@ def ends_of(effect: ColumnEffect, profile: Iterable[Effect] = ()) -> Ends | None
     places = dict(zip(effect.columns, points, strict=True))
     for other in together:
         for name, values in zip(other.columns, other.driven, strict=True):
-            middle = np.nan if values[len(values) // 2] is None else values[len(values) // 2]
-            places.setdefault(name, np.full(points.shape[1], middle, dtype=np.float64))
+            places.setdefault(name, np.full(points.shape[1], np.array(values, dtype=np.float64)[len(values) // 2]))
     responses = [one.settled({name: places[name] for name in one.columns}) for one in together]
     strengths = [one.weighed(response) for one, response in zip(together, responses, strict=True)]
     table = np.sum(strengths, axis=0).reshape(len(grids[0]), -1)
@@ -50,7 +49,6 @@ def ends_of(effect: ColumnEffect, profile: Iterable[Effect] = ()) -> Ends | None
     low, high = _outermost(table[:, beside])
     change = float(table[high, beside] - table[low, beside])
     contrasts = [response[high * size + beside] - response[low * size + beside] for response in responses]
-    errors = [contrast * np.asarray(one.errors) for contrast, one in zip(contrasts, together, strict=True)]
     other_end = int(np.argmax(np.abs(table[high] - table[low] - change)))
 
     def held(row: int, column: int) -> dict[str, float]:
@@ -60,7 +58,9 @@ def ends_of(effect: ColumnEffect, profile: Iterable[Effect] = ()) -> Ends | None
         held(low, beside),
         held(high, beside),
         change,
-        float(np.linalg.norm(np.concatenate(errors))),
+        float(
+            np.linalg.norm([np.linalg.norm(apart * one.errors) for apart, one in zip(contrasts, together, strict=True)])
+        ),
         float(table[high, other_end] - table[low, other_end]) if size > 1 else 0.0,
         held(high, other_end) if size > 1 else None,
         float(np.linalg.norm(contrasts[0] * np.asarray(effect.between_drivers))) if effect.between_drivers else 0.0,
@@ -69,8 +69,8 @@ def ends_of(effect: ColumnEffect, profile: Iterable[Effect] = ()) -> Ends | None
 
 def _goes_along(other: ColumnEffect, effect: ColumnEffect) -> bool:
     """Whether another effect of a profile, of known ends, does something of the same by a column that both read."""
-    shares = other.acts is effect.acts and not set(other.columns).isdisjoint(effect.columns)
-    return shares and bool(other.driven and other.coefficients) and other != effect
+    known = other.acts is effect.acts and bool(other.driven and other.coefficients)
+    return known and not set(other.columns).isdisjoint(effect.columns) and other != effect
 
 
 def _outermost(strength: FloatArray) -> tuple[int, int]:
