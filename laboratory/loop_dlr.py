@@ -49,7 +49,7 @@ def main() -> None:
 def group_table(lack_of_fit: LackOfFit) -> str:
     """Every group of cells, most left unexplained first."""
     rows = ["| cells | before [mm] | after [mm] | floor [mm] | after / floor |", "|---|---|---|---|---|"]
-    for group in sorted(lack_of_fit.groups, key=lambda group: -group.unexplained):
+    for group in sorted(lack_of_fit.groups, key=lambda group: group.floor**2 - group.after**2):
         numbers = f"{1e3 * group.before:.1f} | {1e3 * group.after:.1f} | {1e3 * group.floor:.1f}"
         rows.append(f"| {group.name} | {numbers} | {group.after / group.floor:.2f} |")
     return "\n".join(rows)

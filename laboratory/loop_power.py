@@ -1,9 +1,10 @@
 """Whether `close-loop` finds four of five effects of the size that it states, by planting: what sets `SIZE_MARGIN`.
 
-`python -m laboratory.loop_power [TABLES]`: of so many tables of six drives of five minutes each column's smallest size
-is read as the loop states it. Then an effect of this size, and of half of it, is planted into another movement under
-the same columns, alone and three at once, by a driver who responds within two to four seconds, and the stage that is to
-find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a third.
+`python -m laboratory.loop_power [TABLES] [--seed N]`: of so many tables of six drives of five minutes each column's
+smallest size is read as the loop states it. Then an effect of this size, and of half of it, is planted into another
+movement under the same columns, alone and three at once, by a driver who responds within two to four seconds, and the
+stage that is to find it searches. Shares within 70 to 90 % keep the margin; half the size has to be found at most in a
+third.
 """
 
 from __future__ import annotations
@@ -72,10 +73,10 @@ def response_of(context: Mapping[str, FloatArray], column: str, response_s: floa
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], quantity))
 
 
-def tables(number: int) -> Iterator[tuple[Coarse, Coarse, dict[str, FloatArray], np.random.Generator]]:
+def tables(number: int, start: int) -> Iterator[tuple[Coarse, Coarse, dict[str, FloatArray], np.random.Generator]]:
     """Drives without an effect, other drives under the same columns, those, and what draws timings."""
     for seed in range(number):
-        rng = np.random.default_rng(7000 + seed)
+        rng = np.random.default_rng(start + seed)
         parts = [context_of(rng) for _ in range(DRIVES)]
         columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         first, second = (np.concatenate([moved(rng) for _ in range(DRIVES)]) for _ in range(2))
@@ -112,9 +113,11 @@ def main() -> None:
     """Print shares found."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tables", nargs="?", type=int, default=40)
-    number = parser.parse_args().tables
+    parser.add_argument("--seed", type=int, default=7000, help="of the first table")
+    options = parser.parse_args()
+    number = options.tables
     hits, tried = Counter[str](), Counter[str]()
-    for count, (bare, other, columns, rng) in enumerate(tables(number), start=1):
+    for count, (bare, other, columns, rng) in enumerate(tables(number, options.seed), start=1):
         _, search = search_of(bare, np.random.SeedSequence(1), ["lane_width"], dict.fromkeys(columns, "road"))
         looks = {(one.what, one.acts): one.smallest for one in what_drives_show(search, fit_model(bare, ()))}
         for share in (1.0, 0.5):

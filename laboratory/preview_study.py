@@ -99,9 +99,7 @@ def study(kind: str, seed: int, *, whole: bool) -> dict[str, Any]:
     if whole:
         result = close_loop(drives, seed=1)
         accepted, usable = result.identified.selection.accepted, result.identified.usable
-        known = result.explained
         more = {"error_mm": [1000.0 * result.error_before, 1000.0 * result.error_after]}
-        more |= {"share": None if known is None or not known.is_known else [known.share, *known.interval]}
         more |= {"taken_back": [f"{one.component} {'*'.join(one.columns)}" for one in result.identified.taken_back]}
     else:
         coarse = coarse_of(drive.table)
@@ -125,8 +123,7 @@ def summary(outcomes: Sequence[Mapping[str, Any]]) -> str:
         f"{sum(bool(one['wrong']) for one in outcomes)} drives; one quantity twice "
         f"{sum(one['twice'] for one in outcomes)}; road dismissed {sum(bool(one['dismissed']) for one in outcomes)}",
     ]
-    shares = [one["share"][0] for one in outcomes if one.get("share")]
-    return "\n".join([*lines, f"share of the explainable, median {np.median(shares):.2f}"] if shares else lines)
+    return "\n".join(lines)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -159,7 +156,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         outcomes.append(outcome)
         append_outcome(args.output, outcome)
         named = {None: "-", True: "named", False: "MISSED"}[outcome["named"]]
-        rest = {key: value for key, value in outcome.items() if key in ("dismissed", "error_mm", "share", "taken_back")}
+        rest = {key: value for key, value in outcome.items() if key in ("dismissed", "error_mm", "taken_back")}
         print(f"{kind} {seed}: z {outcome['z']:.1f} {named} | {outcome['words']} | {json.dumps(rest)}", flush=True)
     print(summary(outcomes))
 

@@ -144,7 +144,7 @@ def closed(spec: Spec) -> list[Finding]:
             kind = "stand-in" if alike else "wrong cause"
             out.append({"kind": f"{kind}: {'+'.join(sorted(wrong))}", "size": abs(float(one.size_m)), "said": alike})
         stated = one.ends
-        effect = one.effects[0] if one.effects and stated is not None and not one.over_time else None
+        effect = one.effects[0] if one.effects and stated is not None and one.passage is None else None
         if isinstance(effect, ColumnEffect) and effect.acts is Acts.LOCATION:
             shown = _shown(made.profile, table, stated)
             if abs(shown - float(stated.change)) > max(0.03, 2.0 * float(stated.error)):

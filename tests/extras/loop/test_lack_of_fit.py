@@ -9,7 +9,6 @@ import pytest
 
 from tests.kit.coarse import movement, timeline_of
 from xosc_lateral.extras.loop.residual import (
-    GroupError,
     LackOfFit,
     _mean_of_finite,
     half_samples,
@@ -19,15 +18,6 @@ from xosc_lateral.extras.loop.residual import (
 )
 
 SECONDS = 1800.0
-
-
-def group(after: float, floor: float, name: str = "g") -> GroupError:
-    return GroupError(name, before=1.0, after=after, floor=floor)
-
-
-@pytest.mark.parametrize(("after", "floor", "left"), [(0.05, 0.03, 0.04), (0.03, 0.05, 0.0), (0.1, 0.0, 0.1)])
-def test_what_is_beyond_the_floor_adds_to_it_in_squares(after: float, floor: float, left: float) -> None:
-    assert group(after, floor).unexplained == pytest.approx(left)
 
 
 def test_cells_that_nobody_drove_in_do_not_count() -> None:
@@ -63,5 +53,5 @@ def test_every_group_has_its_own_error_and_floor(drive: Any) -> None:
 
 def test_a_profile_that_is_the_drive_leaves_nothing(drive: Any) -> None:
     lack = left_by(drive, drive[0].offset)
-    assert [one.unexplained for one in lack.groups] == [0.0] * len(lack.groups)
+    assert [one.after for one in lack.groups] == [0.0] * len(lack.groups)
     assert lack.floor > 0.0

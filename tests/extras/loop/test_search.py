@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.kit.coarse import coarse_of, movement, wander
 from xosc_lateral.extras.loop.columns import Column, Values
-from xosc_lateral.extras.loop.dictionary import KEPT_DICTIONARIES, Search
+from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.selection import ERROR_BUDGET
 
 
@@ -23,9 +23,10 @@ def test_what_was_worked_out_last_is_kept_beside_its_fit_and_not_in_a_part() -> 
         made.append(len(made))
         return made[-1]
 
-    fits = [object() for _ in range(KEPT_DICTIONARIES + 1)]
-    assert [search.once(int, fit, make) for fit in fits] == list(range(KEPT_DICTIONARIES + 1))
-    assert [search.once(int, fit, make) for fit in fits[1:]] == list(range(1, KEPT_DICTIONARIES + 1))
-    assert replace(search, coarse=coarse).once(int, fits[-1], make) == KEPT_DICTIONARIES + 1
-    assert search.once(int, fits[0], make) == KEPT_DICTIONARIES + 2
-    assert search.once(str, fits[-1], make) == KEPT_DICTIONARIES + 3
+    first, second = object(), object()
+    assert [search.once(int, fit, make) for fit in (first, first, second, second)] == [0, 0, 1, 1]
+    assert replace(search, coarse=coarse).once(int, second, make) == 2
+    assert search.once(int, first, make) == 3
+    assert search.once(str, first, make) == 4
+    search.forget()
+    assert search.once(str, first, make) == 5

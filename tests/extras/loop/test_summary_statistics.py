@@ -9,7 +9,6 @@ from scipy.stats import chi2
 from xosc_lateral.extras.loop.residual import (
     OSCILLATION,
     SPARE_ROWS,
-    GroupError,
     _mean_of_finite,
     expected,
     half_samples,
@@ -132,9 +131,7 @@ def test_every_group_counts_the_same_however_many_bins_it_has() -> None:
     assert size_of({"c": np.array([nan])}) == 0.0
 
 
-def test_what_is_beyond_a_floor_is_what_adds_to_it_in_squares() -> None:
-    assert GroupError("x", 9.0, after=5.0, floor=3.0).unexplained == 4.0
-    assert GroupError("x", 9.0, after=3.0, floor=5.0).unexplained == 0.0
+def test_a_mean_is_of_what_there_is() -> None:
     np.testing.assert_array_equal(
         _mean_of_finite(np.array([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]])), [2.0, 5.0, np.nan]
     )

@@ -69,6 +69,18 @@ def test_tags_balance_and_ids_are_unique_though_a_figure_appears_twice():
     assert len(seen.ids) == len(set(seen.ids)) > 1
 
 
+def test_a_folded_section_ends_where_the_next_one_begins_and_keeps_its_heading_in_sight():
+    page = Page("Report")
+    page.section("Open", "first")
+    page.section("Folded", "second", folded=True)
+    page.section("Folded, too", "third", folded=True)
+    main = re.search(r"<main>(.*)</main>", page.html({}), re.S)[1].replace("\n", "")
+    details = re.findall(r'<details class="section"><summary>(.*?)</summary>(.*?)</details>', main)
+    assert [re.sub("<[^>]+>", "", head) for head, _ in details] == ["Folded", "Folded, too"]
+    assert [body for _, body in details] == ["<p>second</p>", "<p>third</p>"]
+    assert main.index("first") < main.index("<details")
+
+
 def test_every_reference_inside_the_page_has_its_target_and_none_leads_outside():
     html = full_page()
     ids = set(Balance(html).ids)

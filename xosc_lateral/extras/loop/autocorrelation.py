@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -238,14 +238,15 @@ class Whitener:
         """What every drive tells of its level: 1 / variance, > 0, shape (drives,). [1/m2]"""
         return np.add.reduceat(self.ones**2, self._edges)
 
-    def white(self, values: FloatArray) -> FloatArray:
-        """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k)."""
+    def white(self, values: FloatArray, filtered: FloatArray | None = None) -> FloatArray:
+        """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k); `filtered`:
+        what the process's polynomial makes of them amid runs."""
         columns = values[:, None] if values.ndim == 1 else values
         scaled = columns / self.scale[:, None].astype(columns.dtype)
         start = self.process.start.astype(columns.dtype)
         if not self.runs:
             scaled = np.where(self.valid[:, None], scaled, 0.0)
-        result = moving_sum(self.process.polynomial, scaled)
+        result = moving_sum(self.process.polynomial, scaled) if filtered is None else filtered / self.scale[:, None]
         for run in self._runs:
             stop = min(run.stop, run.start + self.process.order)
             known = stop - run.start
@@ -259,12 +260,24 @@ class Whitener:
         sums = np.add.reduceat(self.ones * self.white(values), self._edges)
         return np.asarray(sums / np.maximum(self.power, 1e-300))
 
-    def rows(self, values: FloatArray) -> FloatArray:
+    def rows(self, values: FloatArray, filtered: FloatArray | None = None) -> FloatArray:
         """Whitened, the drives' levels out; shape of `values` [m], (n,) or (n, k), the rows of variance 1. [-]"""
-        columns = self.white(values[:, None] if values.ndim == 1 else values)
+        columns = self.white(values[:, None] if values.ndim == 1 else values, filtered)
         ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
         mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
         return np.asarray((columns - ones * mean[self.drive]).reshape(values.shape))
+
+    def at_lags(self, values: FloatArray, lags: Sequence[int]) -> Iterator[tuple[FloatArray, FloatArray]]:
+        """Values, shape (n, k), so many rows later each, valid ones only, and the same white, levels out.
+
+        Amid runs what is shifted is filtered once; drives are padded by more than any lag.
+        """
+        seconds, even = np.flatnonzero(self.valid), all(np.ptp(self.scale[run]) == 0.0 for run in self._runs)
+        filtered = moving_sum(self.process.polynomial, values) if even else None
+        for lag in lags:
+            at = np.clip(seconds - lag, 0, len(values) - 1)
+            moved = values[at]
+            yield moved, self.compact.rows(moved, None if filtered is None else filtered[at])
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -47,7 +48,7 @@ class Family(StrEnum):
     PRODUCT = "product"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
     """A quantity with one degree of freedom, not yet sized."""
 
@@ -56,7 +57,7 @@ class Candidate:
     cost: float  # What its family's size takes from its score. [squared score]
     contrast: tuple[float, ...] = (1.0,)  # Weights of the effect's components, where it has several.
 
-    @property
+    @cached_property
     def columns(self) -> tuple[str, ...]:
         """Columns that it reads."""
         return self.effect.columns

@@ -49,11 +49,6 @@ class Finding(Description):
     effects: tuple[Effect, ...] = ()  # What the profile got.
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
 
-    @property
-    def over_time(self) -> bool:
-        """Whether it is a course over time, which one delay does not describe."""
-        return self.passage is not None and self.lag_s is None
-
 
 def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
     """Put errors on held-out blocks to what was described."""
@@ -66,10 +61,10 @@ def describe_finding(
     accepted: Accepted, key: str, effects: tuple[Effect, ...], fitted: Fitted, scored: HeldOut
 ) -> Finding:
     """Put sizes and errors to what was accepted."""
-    term, evidence = accepted.term, {"p_value": accepted.p_value, "gain": accepted.gain}
+    term = accepted.term
     about = {"kind": term.kind, "columns": term.columns, "alike": term.alike, "effects": effects}
     described = agreeing(term.describe(fitted, effects, key), term.kind, accepted.p_value)
-    return _finding(described, scored, **about, **evidence)
+    return _finding(described, scored, p_value=accepted.p_value, gain=accepted.gain, **about)
 
 
 def agreeing(described: Description, kind: str, p_value: float) -> Description:

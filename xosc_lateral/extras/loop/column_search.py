@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
@@ -130,6 +130,8 @@ class ColumnSearch:
     search: Search
     kind: type[SearchedTerm]  # Of the term that it would become.
     fitted: Fitted
+    # Columns that were taken for a product with them that explains more, but not surely so.
+    _simplified: list[tuple[str, ...]] = field(default_factory=list, init=False)
 
     def outcome(self) -> Outcome | None:
         """Best candidate; None: there is no candidate.
@@ -148,11 +150,12 @@ class ColumnSearch:
                 entry, own_p = self.in_some_drives(scored, refused)
                 if entry is not None and self.kind.passes(self.search, own_p, self.fitted):
                     some: SearchedTerm = self.kind.of(scored.dictionary.timed(entry))
-                    return Outcome(some, some.columns, own_p, fit_model(self.fitted.coarse, (*self.fitted.terms, some)))
+                    after = fit_model(self.fitted.coarse, (*self.fitted.terms, some))
+                    return Outcome(some, some.columns, own_p, after, unsure=True)
                 return Outcome(None, likeliest.columns, p_value)
             term, after = self._term(scored, refused)
             if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
-                return Outcome(term, term.columns, p_value, after)
+                return Outcome(term, term.columns, p_value, after, unsure=bool(self._simplified))
             refused.add(term.columns)
             scored = self._scored(scored.problem, scored.dictionary, refused)
         return Outcome(None, min(refused), 1.0) if len(refused) > there else None
@@ -218,11 +221,10 @@ class ColumnSearch:
         return self.fitted.coarse.response(effect), p_value
 
     def _scored_once(self) -> _Scored | None:
-        def make() -> _Scored | None:
-            taken = {term.columns for term in of_kind(self.fitted, self.kind)}
-            return self._scored(self.kind.problem(self.fitted), refused=taken)
-
-        scored: _Scored | None = self.search.once(self.kind, self.fitted, make)
+        taken = {term.columns for term in of_kind(self.fitted, self.kind)}
+        scored: _Scored | None = self.search.once(
+            self.kind, self.fitted, lambda: self._scored(self.kind.problem(self.fitted), refused=taken)
+        )
         return scored
 
     def _scored(
@@ -265,9 +267,9 @@ class ColumnSearch:
 
         @cache
         def by_drive(column: str) -> FloatArray:
-            plain = [i for i, one in enumerate(candidates) if one.columns == (column,) and one.family is Family.PLAIN]
-            if not plain or not 1 < len(drives) <= MOST_DRIVES:
+            if not 1 < len(drives) <= MOST_DRIVES:
                 return np.zeros((len(left), 0))
+            plain = [i for i, one in enumerate(candidates) if one.columns == (column,) and one.family is Family.PLAIN]
             leading = orthonormal(dictionary.rows[plain].astype(np.float64).T, OWN_SLOPES)
             return np.concatenate([leading * (drive == one)[:, None] for one in drives], axis=1)
 
@@ -316,6 +318,7 @@ class ColumnSearch:
         chance = float(chi2.isf(search.levels[self.kind.component], 1)) if search.wanted is None else 0.0
         simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
         best = simpler[0] if simpler else outcomes[0]
+        self._simplified.extend([] if best is outcomes[0] else [best.effect.columns])
         rest = [one for one in outcomes if one.effect.columns != best.effect.columns and np.isfinite(one.score)]
         alike = dict.fromkeys(one.effect.columns for one in rest if refinement.as_good(best.effect, one.effect))
         return best, self.kind.of(best.effect, tuple(alike))

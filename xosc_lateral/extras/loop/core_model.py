@@ -51,9 +51,8 @@ class SpectrumShape:
     def described(self) -> Description:
         """The first-order chain forgets too fast."""
         worst = int(np.argmax(np.abs(np.log(self.ratio))))
-        ratio = float(self.ratio[worst])
+        ratio, measure = float(self.ratio[worst]), "size of the movement by frequency band"
         shape = f"movement within {self.bands_s[worst]:g} s is {ratio:.2f} times the measured"
-        measure = "size of the movement by frequency band"
         return Description("memory beyond one step", shape, ratio, 0.0, "movement by band", measure)
 
 

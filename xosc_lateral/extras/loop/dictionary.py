@@ -121,29 +121,27 @@ def tells_drives(values: FloatArray, coarse: Coarse) -> bool:
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     """Pass every candidate through every response and lag, and whiten it; those left that rest on enough seconds."""
-    seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
     entries: list[tuple[Candidate, float, float]] = []
-    blocks: list[SingleArray] = [np.zeros((0, len(seconds)), dtype=np.float32)]
     single = np.array([len(candidate.columns) == 1 for candidate in quantities.candidates], dtype=np.bool_)
-    for members, grid in ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS)):
+    grids = ((np.flatnonzero(single), TIMINGS), (np.flatnonzero(~single), PRODUCT_TIMINGS))
+    most = sum(len(members) * sum(map(len, grid.values())) for members, grid in grids)
+    table = np.empty((most, int(whitener.valid.sum())), dtype=np.float32)  # what is not written takes no memory
+    for members, grid in grids:
         for first in range(0, len(members), CHUNK_CANDIDATES):
             chunk = members[first : first + CHUNK_CANDIDATES]
             for response_s, lags in grid.items():
                 response = quantities.responses(chunk, response_s)
-                for lag in lags:
-                    # drives are padded by more than any lag
-                    moved = response[np.clip(seconds - lag, 0, len(response) - 1)]
-                    rows = compact.rows(moved)
+                for lag, (moved, rows) in zip(lags, whitener.at_lags(response, lags), strict=True):
                     squares = np.square(rows)
                     power = squares.sum(axis=0)
                     support = power**2 / np.maximum(np.square(squares).sum(axis=0), LEAST_POWER)
                     varies = power > 1e-9 * np.maximum(np.square(moved).sum(axis=0), LEAST_POWER)  # within drives
                     kept = np.flatnonzero(varies & (support >= MIN_SUPPORT_S))
                     unit = rows[:, kept] / np.sqrt(np.maximum(power[kept], LEAST_POWER))
-                    blocks.append(unit.T.astype(np.float32, copy=False))
+                    table[len(entries) : len(entries) + len(kept)] = unit.T
                     entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in kept]
     timings = np.array([entry[1:] for entry in entries]).reshape(-1, 2)
-    return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], np.concatenate(blocks))
+    return Dictionary([entry[0] for entry in entries], timings[:, 0], timings[:, 1], table[: len(entries)])
 
 
 def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> FloatArray:
@@ -273,10 +271,6 @@ def beside(basis: FloatArray, rows: FloatArray) -> FloatArray:
     return np.asarray(rows - basis @ (basis.T @ rows))
 
 
-# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
-KEPT_DICTIONARIES = 2
-
-
 @dataclass(frozen=True, eq=False)
 class Search:
     """What stays the same while terms are selected: columns, candidates before whitening, random streams."""
@@ -290,7 +284,9 @@ class Search:
     # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
     # p-values, and components that have none are not tested. None: this is the table.
     wanted: Mapping[str, int] | None = None
-    _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
+    # What tests of terms gave, by kind and terms fitted; a search in the same part has the same.
+    tested: dict[tuple[object, tuple[object, ...]], Any] = field(default_factory=dict, repr=False)
+    _kept: dict[tuple[object, object], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def over(
@@ -319,13 +315,15 @@ class Search:
         return [one for one in candidates if one.family is Family.PLAIN and len(one.contrast) == 1]
 
     def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
-        """What is worked out once for one kind of term beside one fit; the last few are kept, for one thread."""
-        key = (kind, id(fitted))
-        if key not in self._kept:
-            self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
-            for old in list(self._kept)[:-KEPT_DICTIONARIES]:
-                del self._kept[old]
-        return self._kept[key][1]
+        """What is worked out once for one kind of term beside one fit; the last is kept, of tens of megabytes."""
+        if (kind, fitted) not in self._kept:
+            self.forget()
+            self._kept[kind, fitted] = make()
+        return self._kept[kind, fitted]
+
+    def forget(self) -> None:
+        """What is kept would stay with whoever refers to this search."""
+        self._kept.clear()
 
     def cross_basis(self, columns: Collection[str]) -> FloatArray:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""

@@ -133,9 +133,7 @@ def name_time_beside(search: Search, selection: Selection) -> Selection:
         by_time = fit_model(search.coarse, (*without.terms, test.term))
         if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
             term = replace(before, alike=(*before.alike, ("time",)))
-            accepted = tuple(replace(other, term=term) if other is finding else other for other in selection.accepted)
-            terms = [term if other is before else other for other in selection.final.terms]
-            selection = replace(selection, accepted=accepted, final=fit_model(search.coarse, terms))
+            selection = selection.exchanged(before, term)
     return selection
 
 
@@ -340,14 +338,18 @@ def nest(
 
     def selected(fold: int) -> tuple[Selection, Selection]:
         part = coarse.only(seconds % folds != fold) if folds > 1 else coarse
-        part_of_search = replace(search, coarse=part, progress=lambda _: None)
-        scored = select(part_of_search, initial)
+        part_of_search = replace(search, coarse=part, progress=lambda _: None, tested={})
+        scored = judged = select(part_of_search, initial)
+        part_of_search.forget()
         there = Counter(one.term.component for one in scored.accepted)
-        if not once and all(there[component] >= number for component, number in wanted.items()):
-            return scored, scored
-        return scored, select(replace(part_of_search, wanted=wanted), (*initial, *once))
+        if once or any(there[component] < number for component, number in wanted.items()):
+            more = replace(part_of_search, wanted=wanted)
+            judged = select(more, (*initial, *once))
+            more.forget()
+        return scored, judged
 
     pairs = []
+    search.forget()
     # threads: the work is in compiled code that lets others run, and all folds read the same candidates
     with ThreadPoolExecutor(min(folds, cores())) as pool:
         for pair in pool.map(selected, range(folds)):

@@ -1,4 +1,4 @@
-"""What the measured drives show of effects: offsets by what drives one, hidden ones over time, stretches to look at.
+"""What the measured drives show of effects: offsets by what drives one, and hidden ones over time.
 
 References
 ----------
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +22,6 @@ from xosc_lateral.extras.loop.timeline import LOCAL_S, Timeline, coarse_mean, co
 
 POINTS = 9  # Equally wide bins between the 1 % and 99 % quantile of what drives an effect.
 LEAST_S = 30  # A bin with less driving is left out. [s]
-SHOWN_DRIVES, SHOWN_S = 3, 120.0  # Drives of which a stretch is drawn, and the longest stretch of each. [-], [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -188,18 +186,3 @@ def _longest_run(result: LoopResult) -> BoolArray:
     coarse = result.coarse
     seconds = np.bincount(coarse.drive, coarse.valid.astype(np.float64))
     return np.asarray(coarse.valid & (coarse.drive == int(np.argmax(seconds))))
-
-
-def longest_parts(result: LoopResult) -> list[slice]:
-    """Rows of the longest stretch within one held-out block, of the drives that have the longest; drives in order."""
-    timeline = result.coarse.timeline
-    block = np.where(timeline.valid, hold_out_blocks(timeline), -1)
-    longest: dict[int, slice] = {}
-    for start, stop in pairwise(np.flatnonzero(np.diff(block, prepend=-2, append=-2))):
-        drive = int(timeline.drive[start])
-        known = longest.get(drive, slice(0, 0))
-        if block[start] >= 0 and stop - start > known.stop - known.start:
-            longest[drive] = slice(int(start), int(stop))
-    chosen = sorted(longest, key=lambda drive: longest[drive].start - longest[drive].stop)[:SHOWN_DRIVES]
-    shown = round(SHOWN_S / timeline.step) + 1
-    return [slice(longest[k].start, min(longest[k].stop, longest[k].start + shown)) for k in sorted(chosen)]

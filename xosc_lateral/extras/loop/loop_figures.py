@@ -1,4 +1,4 @@
-"""Figures of a closed loop: residual by context, effect curves, hidden effects over time, traces, spectra, violins."""
+"""Figures of a closed loop: residual by context, effect curves, hidden effects over time, spectra, violins."""
 
 from __future__ import annotations
 
@@ -92,17 +92,16 @@ def _short(value: float) -> str:
 
 
 def effect_figure(result: LoopResult, finding: Finding) -> Figure:
-    """The path in a typical passage, an effect's curve over measured points, and what held-out blocks show."""
+    """A course's path in a typical passage, or an effect's curve over measured points; what held-out blocks show."""
     effect = finding.effects[0]
     assert isinstance(effect, ColumnEffect)
-    curve = not finding.over_time  # a course has no gain that a curve would show
-    figure = Figure(1, 1 + curve + (finding.passage is not None), height=180.0, legend=True)
-    panels = iter(figure.panels)
-    if finding.passage is not None:
-        _draw_passage(next(panels), finding.passage, effect.columns[0])
-    if curve:
-        _draw_curve(next(panels), result, effect)
-    held_out, on_mean = next(panels), effect.acts is Acts.LOCATION
+    figure = Figure(1, 2, height=180.0, legend=True)
+    shown, held_out = figure.panels
+    if finding.passage is not None:  # a course has no gain that a curve would show
+        _draw_passage(shown, finding.passage, effect.columns[0])
+    else:
+        _draw_curve(shown, result, effect)
+    on_mean = effect.acts is Acts.LOCATION
     bins = result.scored.statistics.middles[finding.statistic.split(" by ", 1)[1]]
     bins = bins if on_mean else np.exp(bins)
     for values, color, label in _three(result):
@@ -146,22 +145,6 @@ def _draw_curve(panel: Panel, result: LoopResult, effect: ColumnEffect) -> None:
 
 
 # ---- movement ----
-def traces_figure(result: LoopResult) -> Figure:
-    """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
-    timeline, scored = result.coarse.timeline, result.scored
-    parts = loop_curves.longest_parts(result)
-    figure = Figure(len(parts), 3, height=54.0, share_x="all", share_y="all")
-    offsets = (timeline.offset, scored.runs_before[0], scored.runs_after[0])
-    for number, rows in enumerate(parts):
-        name = timeline.names[timeline.drive[rows.start]]
-        for panel, offset, (_, color, label) in zip(figure.row(number), offsets, _three(result), strict=True):
-            panel.level()
-            panel.line(timeline.time[rows] - timeline.time[rows.start], offset[rows], color, label=label)
-            panel.title, panel.x.label = f"{name}, {label}", "time [s]"
-    figure.row(len(parts) // 2)[0].y.label = "offset [m]"
-    return figure
-
-
 def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
     """Power density of measured offsets and of both profiles' held-out runs."""
     figure = Figure(height=170.0, legend=True)

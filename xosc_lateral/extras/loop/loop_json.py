@@ -33,7 +33,6 @@ FINDING_FIELDS = (
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
     """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     own_errors = result.own_errors
-    error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     scores = result.scores
     return {
         "drives": list(result.coarse.timeline.names),
@@ -56,7 +55,10 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "shown": shown_records(result.shown),
         "own_error": own_errors and {"before": own_errors[0], "after": own_errors[1]},
-        "error": {"measure": MEASURE, **error},
+        "error": {
+            **{"measure": MEASURE, "before": result.error_before, "after": result.error_after},
+            "floor": result.floor,
+        },
         "held_out_gain": _gain(result.identified.total),
         "returned_base": result.identified.returned_base or None,
         "unexplained": {

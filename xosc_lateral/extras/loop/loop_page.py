@@ -11,15 +11,12 @@ from xosc_lateral.extras.loop.close import LoopResult
 from xosc_lateral.extras.loop.held_out import SNIPPET_ROWS
 from xosc_lateral.extras.loop.identify import held_out_words
 from xosc_lateral.extras.loop.loop_json import column_record
-from xosc_lateral.files.pages.page import KeyFigure, Page, Tone
+from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
+from xosc_lateral.workflows.profiles.violins import violin_figure
 
 NAMED_DRIVES = 3  # So many drives are named in the title; more are counted.
-LEFT_ROWS = 8  # Rows of the table of what is left.
-# Ratios to halves of the drives from which a number is marked bad, and up to which it is marked good. [-]
-BAD_RATIO, GOOD_RATIO = 2.0, 1.2
 
 
 def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
@@ -37,40 +34,29 @@ def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] 
     _add_findings(page, result, proofs)
     _add_residuals(page, result)
     _add_movement(page, result)
-    page.section("What these drives can show", loop_words.SHOWN_NOTE)
+    page.section("What these drives can show", loop_words.SHOWN_NOTE, folded=True)
     page.table(loop_words.shown_rows(result.shown))
-    page.section("Consequences of the car's own movement")
-    page.text(
-        "These columns are, or may be, brought about by the car's own movement, as the angle of a steering wheel is. "
-        "They are not used as causes."
-    )
-    feedback = result.identified.usable.feedback
-    page.table([{"column": item.column, "reason": loop_words.feedback_words(item)} for item in feedback])
-    page.section(
-        "Tested and rejected",
-        "The strongest candidate of each component that was not significant, and what was found and taken back.",
-    )
+    reasons = {item.column: loop_words.feedback_words(item) for item in result.identified.usable.feedback}
+    page.section("Columns, and what they are taken for", folded=True)
     page.table(
         [
-            {
-                "component": loop_words.COMPONENT_WORDS.get(item.component, item.component),
-                "strongest candidate": ", ".join(item.columns) or None,
-                "p-value": item.p_value,
-                "reason": item.why,
-            }
+            column_record(column, result) | {"why": reasons.get(column)}
+            for column in sorted(result.identified.usable.roles)
+        ],
+        "What a column is, who said so, and its use. What follows from the car's own movement, as the angle of a "
+        "steering wheel does, is no cause, nor is time. Say what a column is with `--role COLUMN=ROLE`: road, weather "
+        "and traffic are always tested as causes.",
+    )
+    page.section("What was looked for and not added", folded=True)
+    page.table(
+        [
+            {"not added": loop_words.taken_back_words(item), "p-value": item.p_value}
             for item in result.identified.selection.rejected
         ],
+        "Of every question the strongest candidate that is not significant; and what was found and taken back.",
         formats={"p-value": ".2g"},
     )
-    page.items(f"`{column}` was not tested: {why}." for column, why in result.identified.usable.unused.items())
-    page.section("Columns, and what they are taken for")
-    page.table(
-        [column_record(column, result) for column in sorted(result.identified.usable.roles)],
-        "Role of every column, by whom it was given, and its use. Road, weather and traffic that are declared are "
-        "never dismissed as consequences; own movement and time are never causes; all others are tested. Declare with "
-        "`--role COLUMN=ROLE`.",
-    )
-    page.section("How to read this page")
+    page.section("How to read this page", folded=True)
     runs = len(result.scored.runs_after)
     page.items(line.format(n_runs=runs, certain=f"{loop_words.CERTAIN_P_VALUE:g}") for line in HOW_TO_READ)
     return page.html(
@@ -114,9 +100,14 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
         elif finding.statistic in result.scored.real:
             page.figure(
                 loop_figures.effect_figure(result, finding),
-                "Path: where the effect puts the car while its column goes from its usual value to a high one and "
-                "back. Effect: fitted, and measured offsets less the drives' means and all other effects. Bars and "
-                "bands: two standard errors. Held-out blocks: means by fifths of the effect.",
+                (
+                    "Left: the effect as fitted, and what was measured less all else that is known."
+                    if finding.passage is None
+                    else "Left: where the effect puts the car while its column goes from its usual value to a high one "
+                    "and back."
+                )
+                + " Bars and bands: two standard errors. Right: measured, and both profiles, on stretches "
+                "that nothing was fitted to.",
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
     if proofs:
@@ -133,10 +124,10 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
 
 def _add_residuals(page: Page, result: LoopResult) -> None:
     page.section(
-        "Residual by context",
-        "Measured minus expected offset on held-out blocks, by quantile groups of every column and by time; the values "
-        "of the column stand below each panel. The band is the sampling error (95 %): residuals within it are no sign "
-        "of a lack of fit.",
+        "What is left, by every column",
+        "Measured minus expected offset where nothing was fitted, over fifths of every column and over time; the "
+        "column's values stand below each panel. Within the grey band is what chance leaves (95 %).",
+        folded=True,
     )
     page.text("" if result.identified.usable.columns else "The table has no column that varies.")
     for what, words in (("mean", "mean offset"), ("spread", loop_words.SPREAD)):
@@ -147,33 +138,10 @@ def _add_residuals(page: Page, result: LoopResult) -> None:
                 f"Residual of the {words}, before (grey) and after (orange). Columns of the effects come first.",
                 f"Residual of the {words} by every context column.",
             )
-    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
-    page.table(
-        [
-            {
-                "group": loop_words.group_words(group.name, result),
-                "before": 1000.0 * group.before,
-                "after": 1000.0 * group.after,
-            }
-            | {"between halves": 1000.0 * group.floor, "ratio": group.after / group.floor if group.floor > 0 else None}
-            for group in groups
-        ],
-        f"The {len(groups)} of {len(result.lack_of_fit.groups)} groups of statistics with the largest residual above "
-        "that between halves: root mean square of measured minus expected [mm]. All groups are in report.json.",
-        formats={"before": ".1f", "after": ".1f", "between halves": ".1f", "ratio": ".2f"},
-        tones={k: "bad" for k, group in enumerate(groups) if group.after > BAD_RATIO * group.floor},
-    )
 
 
 def _add_movement(page: Page, result: LoopResult) -> None:
-    page.section("Movement")
-    page.figure(
-        loop_figures.traces_figure(result),
-        "Offsets as measured, and one simulated run of the profile before and of the profile after under the same "
-        "context, on blocks that neither was fitted to. The curves are not meant to coincide: two drives of the same "
-        "driver do not either. What should agree is how they move.",
-        "Measured and simulated offsets over time, drive by drive",
-    )
+    page.section("How the profile moves beside the driver", folded=True)
     page.figure(
         loop_figures.spectrum_figure(result),
         "Power spectral density within held-out blocks. Where a profile's curve lies in the band, its movement is "
@@ -184,26 +152,15 @@ def _add_movement(page: Page, result: LoopResult) -> None:
     if scores.before is None or scores.after is None or scores.floor is None:
         page.text(f"There are too few snippets of {seconds:g} s to compare metrics.")
         return
-    before, after, floor = scores.before.by_metric, scores.after.by_metric, scores.floor.by_metric
-    page.table(
-        [
-            {"metric": METRIC_WORDS[name], "before": before[name], "after": after[name], "between halves": floor[name]}
-            for name in before
-        ],
-        f"Ten metrics of snippets of {seconds:g} s: distance from the measured ones, in standard deviations of these",
-        formats=dict.fromkeys(("before", "after", "between halves"), ".3f"),
-        tones={k: _tone(after[name], floor[name]) for k, name in enumerate(before)},
-    )
+    before, after, floor = scores.before.mean, scores.after.mean, scores.floor.mean
     page.figure(
         violin_figure(scores.real, scores.sampled_after, scores.sampled_before, ("measured", "profile")),
-        f"Ten metrics of snippets of {seconds:g} s: measured (left, blue), profile after (right, orange), profile "
-        "before (dashed). Bars: minimum, mean, maximum.",
+        f"Ten metrics of stretches of {seconds:g} s: measured (left, blue), profile after (right, orange), profile "
+        "before (dashed). Bars: minimum, mean, maximum. Their mean distance from the measured ones is "
+        f"{before:.2f} standard deviations before and {after:.2f} after; {floor:.2f} between halves of the drives. "
+        "Each is in report.json.",
         "Ten violins, measured beside the profile after and before.",
     )
-
-
-def _tone(value: float, floor: float) -> Tone:
-    return "bad" if value > BAD_RATIO * floor else "good" if value <= GOOD_RATIO * floor else ""
 
 
 def _capital(words: str) -> str:

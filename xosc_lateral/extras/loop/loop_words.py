@@ -52,9 +52,9 @@ _PLAIN_GROUPS: Mapping[str, str] = {
     "mean by effect: step 0": "mean before and after it",
 }
 
-# Of each kind of finding without a column its size, with its error, and what it means.
+# Of each kind of finding without a column its size, with its error, empty: a shift; and what it means.
 KINDS: Mapping[str, tuple[str, str]] = {
-    "location": (f"{{0:+.2f}}{{1}}{GAP}m", ""),
+    "location": ("", ""),
     "scale": (
         f"factor{GAP}{{0:.2f}}{{1}}",
         "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
@@ -64,12 +64,12 @@ KINDS: Mapping[str, tuple[str, str]] = {
         "The car oscillates at a steady frequency, whatever the road and the traffic do.",
     ),
     "drift": (
-        f"{{0:+.2f}}{{1}}{GAP}m",
+        "",
         "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
         "camera whose calibration depends on temperature.",
     ),
     "step": (
-        f"{{0:+.2f}}{{1}}{GAP}m",
+        "",
         "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
         "recalibrated camera, for example, or a change of driver.",
     ),
@@ -115,8 +115,9 @@ def size_words(finding: Finding) -> str:
     effect, ends = finding.effects[0] if finding.effects else None, finding.ends
     if ends is None or not isinstance(effect, ColumnEffect):
         about = f"{GAP}±{GAP}{2.0 * finding.size_error:.2f}" if finding.size_error else ""
-        return KINDS[finding.kind][0].format(finding.size_m, about)
-    if finding.passage is not None and finding.over_time:
+        shift = change_words(Acts.LOCATION, finding.size_m, finding.size_error)
+        return KINDS[finding.kind][0].format(finding.size_m, about) or shift
+    if finding.passage is not None:
         return _passage_words(finding.passage, finding.columns[0])
     change, error = finding.size_m, finding.size_error
     if effect.acts is not Acts.LOCATION:
@@ -138,7 +139,8 @@ def _passage_words(passage: Passage, column: str) -> str:
         if not sides or abs(size) > error:
             when = f"{abs(moment):.0f}{GAP}s {'before' if moment < 0 else 'after'} it begins"
             sides.append(f"{abs(size):.2f}{GAP}±{GAP}{error:.2f}{GAP}m further {side_of(size)} {when}")
-    usual = f"{passage.usual:.3g}" if np.isfinite(passage.usual) else "none"
+    none = np.isnan(passage.usual)
+    usual = "none" if none else f"{passage.usual:.3g}" if abs(passage.usual) > 1e-3 * abs(passage.high) else "0"
     hint = f"; {HINTS[column]}" if column in HINTS else ""
     goes = f"`{column}` from {usual} to {passage.high:.3g} {plain_unit(column)}".rstrip()
     return f"{', '.join(sides)} in a typical passage ({goes} for {passage.lasts_s:.0f}{GAP}s{hint})"
@@ -153,15 +155,19 @@ def p_value_words(p_value: float) -> str:
 
 def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
-    hidden = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
-    usual = " What counts is the mean of each drive, not changes within a drive."
-    whole_drives = bool(finding.columns) and finding.lag_s is None and not finding.over_time
-    sentence = finding_sentence(finding)
-    return (
-        f"{'' if finding.columns else f'{hidden} '}{sentence[0].upper()}{sentence[1:]}.{usual if whole_drives else ''} "
-        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}). "
-        f"Error of the {_PLAIN_GROUPS.get(finding.statistic, finding.measure)} on held-out blocks: "
-        f"{_mm(finding.error_before)} before, {_mm(finding.error_after)} now."
+    words = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
+    sentence, whole_drives = finding_sentence(finding), finding.columns and finding.lag_s is None
+    usual = "It goes by the mean of each drive, not by changes within one."
+    compared = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
+    return " ".join(
+        [
+            *([] if finding.columns or not words else [words]),
+            f"{sentence[0].upper()}{sentence[1:]}.",
+            *([usual] if whole_drives and finding.passage is None else []),
+            f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
+            f"On stretches that nothing was fitted to, the profile was {_mm(finding.error_before)} off before, and is "
+            f"{_mm(finding.error_after)} off now ({compared}).",
+        ]
     )
 
 
@@ -221,7 +227,8 @@ def outcome(result: LoopResult) -> str:
     findings, back = result.findings, result.identified.taken_back
     words = []
     if findings:
-        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in findings)
+        names = "; ".join(finding.effect for finding in findings)
+        names += f" ({size_words(findings[0])})" if len(findings) == 1 else ""
         words.append(f"{len(findings)} effect{'s' * (len(findings) > 1)} found and added to the profile: {names}.")
     elif not back:
         words.append("No significant effect was found, and none was added.")
@@ -253,15 +260,6 @@ def verdict(result: LoopResult) -> str:
     )
     unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
     return f"{words} {unseen} {shown_words(result.shown)}"
-
-
-def group_words(name: str, result: LoopResult) -> str:
-    """A group of cells as a reader would call it."""
-    for finding in result.findings:
-        key = finding.statistic.partition(" by effect: ")[2]
-        if key and name.endswith(f" by effect: {key}"):
-            return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
-    return _PLAIN_GROUPS.get(name, name)
 
 
 def _mm(value: float) -> str:

@@ -100,6 +100,7 @@ class Outcome:
     after: Fitted | None = None  # Fit with the term, where the test has made it.
     together: tuple[Term, ...] = ()  # Found with it, as one finding.
     instead_of: Term | None = None  # Whose place it takes.
+    unsure: bool = False  # Whether a part of a table, which need not be sure of what it takes, might take another.
     own_way: float | None = None  # p-value of a change within drives, where each changes in its own way.
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.extras.loop.columns import MIN_SHARE
-from xosc_lateral.extras.loop.timeline import COARSE, Coarse, coarse_mean
+from xosc_lateral.extras.loop.timeline import COARSE, Coarse
 
 BEFORE_S, AFTER_S = 10.0, 20.0  # What is shown before a passage begins and after it ends: all delays. [s]
 LONGEST_S = 60.0  # Where a column stays for longer, all that there is to see is seen by then. [s]
@@ -42,12 +42,6 @@ class Passage:
         """The farthest that the car goes, to the left, and its standard error. [m]"""
         return float(self.path[self.at]), float(self.error[self.at])
 
-    @property
-    def share_of_error(self) -> float:
-        """Of the farthest. [-]"""
-        size, error = self.largest_shift
-        return error / max(abs(size), 1e-12)
-
 
 def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
     """From a column's median to its farther outer quantile, or from none to it, as long and steep as usual."""
@@ -68,14 +62,6 @@ def typical_passage(coarse: Coarse, effect: ColumnEffect) -> Passage:
     knots = BEFORE_S + np.array([0.0, ramp, lasts, lasts + ramp])
     time = timeline.step * np.arange(COARSE * int(np.ceil(knots[-1] + AFTER_S)))
     return Passage(np.interp(time, knots, [usual, high, high, usual]), float(usual), float(high), float(lasts))
-
-
-def passage_of(coarse: Coarse, effect: ColumnEffect, share_of_error: float) -> Passage:
-    """Typical passage with what a sized effect does in it, its error the same share all along."""
-    passage, step = typical_passage(coarse, effect), coarse.timeline.step
-    path = coarse_mean(np.asarray(effect.strength(step, {effect.columns[0]: passage.column})))
-    path = path - path[0]
-    return replace(passage, path=path, error=np.abs(path) * share_of_error)
 
 
 def _median_length(there: BoolArray, step: float) -> float:

@@ -65,6 +65,8 @@ class Refinement:
 
     def refine(self, effect: ColumnEffect, price: float, columns: Mapping[str, Column]) -> Refined:
         """Shape, timing, shape again, timing again, each time in finer steps."""
+        self._quantities.clear()  # of other columns
+        self._responses.clear()
         best = Refined(effect, self.scores([effect])[0] - price, price)
         best = self._best(best, list(self._shapes(best.effect, columns)))
         for step in LAG_STEPS:

@@ -179,11 +179,6 @@ class GroupError:
     after: float
     floor: float
 
-    @property
-    def unexplained(self) -> float:
-        """What is left beyond the sampling error. [m]"""
-        return float(np.sqrt(max(self.after**2 - self.floor**2, 0.0)))
-
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:

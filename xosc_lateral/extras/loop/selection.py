@@ -8,19 +8,22 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from logging import getLogger
 
 import numpy as np
+from msgspec import structs
 
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
+from xosc_lateral.drivers.model.effects import ColumnEffect, Form, Product
+from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop import terms
 from xosc_lateral.extras.loop.core_model import MIN_DRIVES
 from xosc_lateral.extras.loop.dictionary import Search
-from xosc_lateral.extras.loop.model import Fitted, Stage, Term, design_of, fit_model
+from xosc_lateral.extras.loop.model import Fitted, Outcome, Stage, Term, design_of, fit_model, proper
 from xosc_lateral.extras.loop.significance import BUDGET
 from xosc_lateral.extras.loop.terms.column import ColumnTerm
 
@@ -129,6 +132,12 @@ class Selection:
         fitted = [term for term in self.final.terms if id(term) not in gone] + [one.term for one in back.values()]
         return Selection((*left, *back.values()), tuple(rejected), self.start, fit_model(self.final.coarse, fitted))
 
+    def exchanged(self, before: Term, after: Term) -> Selection:
+        """With one accepted term in place of another, fitted again."""
+        accepted = tuple(replace(one, term=after) if one.term is before else one for one in self.accepted)
+        fitted = [after if term is before else term for term in self.final.terms]
+        return replace(self, accepted=accepted, final=fit_model(self.final.coarse, fitted))
+
 
 def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
     """Add terms stage by stage to those that are in the model already."""
@@ -145,7 +154,7 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 component = kind.component
                 search.progress(f"looking at {component.replace('_', ' ')}")
                 try:
-                    test = kind.test(search, fitted)
+                    test = _tested(search, kind, fitted)
                 except UNFORESEEN as error:
                     seen_at[component] = len(accepted)
                     rejected[component] = Rejected(component, (), 1.0, failed("its test", error))
@@ -158,8 +167,10 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                     seen_at[component] = len(accepted)
                     why = f"not significant: its p-value is above {search.levels[component]:.2g}"
                     if (own_way := test.own_way) is not None:
-                        why = f"it changes within drives (p = {own_way:.1e}), in each in its own way"
-                        why = f"{why}, which no profile knows"
+                        why = (
+                            f"it changes within drives (p = {own_way:.1e}), in each in its own way, which no profile "
+                            "knows"
+                        )
                     rejected[component] = Rejected(
                         component, test.columns, test.p_value, why, own_way=own_way is not None
                     )
@@ -180,9 +191,17 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
             selection = _tested_again(search, selection, candidate)
         except UNFORESEEN as error:
             selection = selection.without([candidate.term], failed("its second test", error))
-    selection = _beside_products(_that_can_be_told(selection))
+    selection = beside_products(_that_can_be_told(selection))
     undone = [one.term for one in selection.accepted if is_undone_by_levels(selection.final, one.term)]
     return selection.without(undone, UNDONE)
+
+
+def _tested(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
+    """A test's outcome; one that is known already, unless a part of a table, which need not be sure, may take more."""
+    known: Outcome | None = search.tested.get((kind, fitted.terms))
+    if known is None or known.unsure or (known.term is None and kind.passes(search, known.p_value, fitted)):
+        known = search.tested[kind, fitted.terms] = kind.test(search, fitted)
+    return known
 
 
 def failed(what: str, error: Exception) -> str:
@@ -193,25 +212,44 @@ def failed(what: str, error: Exception) -> str:
 
 def _that_can_be_told(selection: Selection) -> Selection:
     """Less what can't be sized or described: one faulty effect must not cost the others."""
-    for accepted in selection.accepted:
-        alone = fit_model(selection.final.coarse, [*selection.start.terms, accepted.term])
-        try:
-            accepted.term.describe(alone, alone.effects_of(accepted.term), "")
-        except UNFORESEEN as error:
-            selection = selection.without([accepted.term], failed("its description", error))
+    asks: tuple[Callable[[Fitted, Term], object], ...] = (
+        Fitted.effects_of,  # of all first: what is said of one is said beside the others
+        lambda final, term: term.describe(final, final.effects_of(term), ""),
+    )
+    for ask in asks:
+        for accepted in selection.accepted:
+            try:
+                ask(selection.final, accepted.term)
+            except UNFORESEEN as error:
+                selection = selection.without([accepted.term], failed("its description", error))
     return selection
 
 
-def _beside_products(selection: Selection) -> Selection:
+def beside_products(selection: Selection) -> Selection:
     """Less what a column does alone that is within its error of nothing beside its product (Nelder 1977): the product's
-    space holds the column's own effect, so it is sized beside it, not searched for again."""
+    space holds the column's own effect, so it is sized beside it, not searched for again.
+
+    Beside it a product counts from the other column's median: what the column does alone is then what it does usually.
+    """
+    coarse = selection.final.coarse
+    for term in [one.term for one in selection.accepted if isinstance(one.term, ColumnTerm)]:
+        if isinstance(term.effect, Product):
+            single = {one.term.columns for one in selection.accepted if one.term.kind == term.kind}
+            centred = tuple(
+                structs.replace(factor, at=float(np.nanmedian(coarse.context[factor.column][coarse.timeline.valid])))
+                if factor.form is Form.VALUE and factor.at and (other.column,) in single
+                else factor
+                for factor, other in zip(term.effect.factors, reversed(term.effect.factors), strict=True)
+            )
+            if centred != term.effect.factors:
+                effect = structs.replace(term.effect, factors=centred)
+                selection = selection.exchanged(term, replace(term, effect=effect))
     parts = [one.term for one in selection.accepted if isinstance(one.term, ColumnTerm)]
     for term in parts:
         if not any(set(term.columns) < set(other.columns) for other in parts):
             continue
-        described = term.describe(selection.final, selection.final.effects_of(term), "")
-        change = 0.0 if described.ends is None else described.ends.change
-        if (described.ends is not None and abs(change) < NORMAL_95 * described.ends.error) or not change:
+        alone = ends_of(proper(selection.final.effects_of(term), ColumnEffect))  # type: ignore[type-abstract]
+        if alone is None or abs(alone.change) <= NORMAL_95 * alone.error:
             selection = selection.without([term], BY_PRODUCT)
     return selection
 

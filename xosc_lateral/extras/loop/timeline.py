@@ -161,13 +161,15 @@ def start_anew(
     response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
 ) -> FloatArray:
     """A first-order lag over drives in a row, settled anew where each starts: what is constant in drives stays so."""
-    begins = np.diff(drive, prepend=-1) > 0  # drives are in order
-    starts, number, rows = np.flatnonzero(begins), np.cumsum(begins) - 1, np.arange(len(values))
+    starts = np.flatnonzero(np.diff(drive, prepend=-1))  # drives are in order
     lasting = round(np.log(FORGOTTEN) / np.log(max(keep, FORGOTTEN))) + 1
-    left = np.append(keep ** np.arange(lasting).astype(values.dtype), values.dtype.type(0.0))
-    left = left[np.minimum(rows - starts[number], lasting)]
-    off = (response[starts] - values[starts])[number]
-    return np.asarray(response - off * (left[:, None] if values.ndim == 2 else left))
+    lengths = np.minimum(np.diff(starts, append=len(drive)), lasting)
+    number = np.repeat(np.arange(len(starts)), lengths)
+    since = np.arange(len(number)) - (np.cumsum(lengths) - lengths)[number]
+    left = (keep ** np.arange(lasting).astype(values.dtype))[since]
+    off, anew = (response[starts] - values[starts])[number], response.copy()
+    anew[starts[number] + since] -= off * (left[:, None] if values.ndim == 2 else left)
+    return anew
 
 
 def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:

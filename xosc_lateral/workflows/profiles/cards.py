@@ -21,7 +21,7 @@ from xosc_lateral.files.pages.chart import SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.files.profiles import FIELDS, Entry, facts_of, profile_hash
-from xosc_lateral.workflows.profiles.effect_words import effect_line
+from xosc_lateral.workflows.profiles.effect_words import effect_line, side_of
 
 SINGLE_DRIVER_DRIVES = 10  # Drives below which a profile is taken to be of one driver.
 SHOWN_DRIVERS, SHOWN_S = 4, 120.0  # Sample paths that are drawn, and their length. [s]
@@ -131,15 +131,14 @@ def noted(profile: DriverProfile) -> str:
 def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKeeping) -> list[tuple[str, str]]:
     """What there is to know of a profile, a line each: label and words; an empty one has nothing to say."""
     known = profile.provenance
-    count = len(profile.effects)
-    effects = "1 effect" if count == 1 else f"{count or 'no'} effects"
+    effects = f"{len(profile.effects) or 'no'} effect{'s' * (len(profile.effects) != 1)}"
     rows = [
         ("valid", profile.validity.in_words()),
         ("model", f"{profile.model.kind}, {effects}, lane width {profile.lane_width:.2f} m"),
-        *(("effect", effect_line(effect)) for effect in profile.effects),
+        *(("effect", effect_line(effect, profile.effects)) for effect in profile.effects),
         ("neighbours", profile.responses_in_words()),
         ("maneuvers", "" if profile.maneuvers is None else profile.maneuvers.in_words()),
-        ("mean", f"{keeping.line('mean', 'm')}, {_side(keeping)} of the lane centre"),
+        ("mean", f"{keeping.line('mean', 'm')}, {side_of(keeping.mean)} of the lane centre"),
         ("spread", f"{_spread(known, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m"),
         ("speed", f"{summary.lateral_speed:.3f} m/s lateral (rms)"),
         ("lane", keeping.words),
@@ -153,10 +152,6 @@ def card_rows(profile: DriverProfile, summary: MovementSummary, keeping: LaneKee
         *_outcome(known),
     ]
     return [(label, words) for label, words in rows if words]
-
-
-def _side(keeping: LaneKeeping) -> str:
-    return "left" if keeping.mean > 0 else "right"
 
 
 def _spread(known: Provenance, summary: MovementSummary) -> str:
@@ -206,7 +201,7 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
     page.lead(noted(profile))
     page.key_figures(
         [
-            KeyFigure(f"{keeping.mean:+.2f} m", f"mean offset: {_side(keeping)} of the lane centre"),
+            KeyFigure(f"{keeping.mean:+.2f} m", f"mean offset: {side_of(keeping.mean)} of the lane centre"),
             KeyFigure(f"{keeping.sdlp:.2f} m", "SDLP: standard deviation within a drive", _spread(known, summary)),
             KeyFigure(
                 f"{summary.low:+.2f} to {summary.high:+.2f}\N{NO-BREAK SPACE}m",

@@ -34,10 +34,9 @@ def comparison_text(compared: Compared) -> str:
         aligned([list(rows[0]), *(list(row.values()) for row in rows)])
         for rows in ([_row(each) for each in compared.profiles], _pairs(compared))
     )
-    lines = [*profiles, f"{FIGURES_NOTE}.", "", *pairs, f"{_distance_note(compared)}."]
-    lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
-    lines += looks_of(compared)
-    return "\n".join(lines)
+    alike = (f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1)
+    notes = f"{_distance_note(compared)}.", *alike, *looks_of(compared)
+    return "\n".join([*profiles, f"{FIGURES_NOTE}.", "", *pairs, *notes])
 
 
 def looks_of(compared: Compared) -> list[str]:
@@ -119,7 +118,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "model": each.profile.model.kind,
                 **figures_record(each.summary, each.keeping),
                 "look": each.profile.provenance.fit.get("look"),
-                "effects": [effect_line(effect) for effect in each.profile.effects],
+                "effects": [effect_line(effect, each.profile.effects) for effect in each.profile.effects],
             }
             for each in compared.profiles
         ],
@@ -193,5 +192,6 @@ def comparison_page(compared: Compared) -> str:
     )
     page.section("Summary")
     page.table([_nowrap(_row(each)) for each in compared.profiles], FIGURES_NOTE.replace("+-", "±"))
-    hashes = {each.profile.name: profile_hash(each.profile)[:12] for each in compared.profiles}
-    return page.html({"seed": compared.seed, **hashes})
+    return page.html(
+        {"seed": compared.seed, **{each.profile.name: profile_hash(each.profile)[:12] for each in compared.profiles}}
+    )

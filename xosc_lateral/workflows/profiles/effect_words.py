@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def elsewhere_words(acts: Acts, ends: Ends) -> str:
 
 
 def _value(value: float) -> str:
-    return "none" if np.isnan(value) else f"{value:.3g}"
+    return "none" if np.isnan(value) else f"{value:.3g}" if abs(value) < 1000.0 else format_value(value)
 
 
 def timing_words(lag_s: float, response_s: float) -> str:
@@ -84,15 +84,17 @@ def timing_words(lag_s: float, response_s: float) -> str:
     return f"begins {begins}, response time {response_s:.1f} s"
 
 
-def effect_line(effect: Effect) -> str:
-    """An effect in a line: what it changes, by how much and between which ends; a hidden one by its parameters."""
+def effect_line(effect: Effect, profile: Iterable[Effect] = ()) -> str:
+    """An effect of a profile in a line: what it changes, how much and between which ends; a hidden one's parameters."""
     if isinstance(effect, ColumnEffect):
-        ends = None if effect.course else ends_of(effect)
+        ends = None if effect.course else ends_of(effect, profile)
         size = ""
         if ends is not None:
-            size = f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
-            size += f"{elsewhere_words(effect.acts, ends)};"
-            size += f" drivers differ by {ends.scatter / abs(ends.change):.0%} of it;" if ends.scatter else ""
+            size = (
+                f" {change_words(effect.acts, ends.change, ends.error)} {where_words(ends)}"
+                f"{elsewhere_words(effect.acts, ends)};"
+                + (f" drivers differ by {ends.scatter / abs(ends.change):.0%} of it;" if ends.scatter else "")
+            )
         timing = "a course over time" if effect.course else timing_words(effect.lag_s, effect.response_time)
         return f"{TARGET_WORDS[effect.acts]} by {' and '.join(effect.columns)}:{size} {timing}; {effect.shape}"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}

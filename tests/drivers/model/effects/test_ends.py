@@ -28,6 +28,7 @@ from xosc_lateral.drivers.model.effects import (
     Threshold,
 )
 from xosc_lateral.drivers.model.effects.ends import Ends, ends_of
+from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.extras.loop.terms.column import driven_values
 from xosc_lateral.files.profiles import read_profile
@@ -82,9 +83,13 @@ def fitted(effect: ColumnEffect) -> ColumnEffect:
 
 def sampled(effect: ColumnEffect, held: Mapping[str, float]) -> np.ndarray:
     """Offsets while the columns stay, after half a minute."""
+    return _sampled(BARE.with_effects(effect), held)
+
+
+def _sampled(profile: DriverProfile, held: Mapping[str, float]) -> np.ndarray:
     context = {name: np.full(ROWS, value) for name, value in held.items()}
     segment = Segment(0.2 * np.arange(ROWS), np.full(ROWS, 3.6), np.full(ROWS, 30.0), context)
-    return np.asarray(sample_offsets(BARE.with_effects(effect), segment, 1)[ROWS // 4 :])
+    return np.asarray(sample_offsets(profile, segment, 1)[ROWS // 4 :])
 
 
 def ends(effect: ColumnEffect) -> Ends:
@@ -113,6 +118,24 @@ def test_a_profile_does_at_the_ends_what_is_said_of_them(name: str) -> None:
     if told.other is not None:
         elsewhere = float(np.mean(sampled(effect, told.other) - sampled(effect, {**told.low, **_second(told)})))
         assert elsewhere == pytest.approx(told.elsewhere, abs=0.1 * abs(told.change))
+
+
+def test_a_product_is_said_with_what_its_columns_do_alone_as_the_profile_does_both() -> None:
+    """Of the product alone the sentence named the opposite side: the column's own effect is larger."""
+    pair = (Factor(column="x", form=Form.VALUE), Factor(column="angle", form=Form.VALUE, at=180.0))
+    product, alone = fitted(made(Product, 0.001, factors=pair)), fitted(made(Linear, -0.4, **X))
+    by_itself, told = ends(product), ends_of(product, (alone, product))
+    assert told is not None
+    assert by_itself.change * told.change < 0.0
+    both = BARE.with_effects(product, alone)
+    low, high = (float(_sampled(both, held).mean()) for held in (told.low, told.high))
+    assert high - low == pytest.approx(told.change, rel=0.1)
+    own = ends_of(alone, (alone, product))
+    assert own is not None
+    assert set(own.low) == {"x", "angle"}  # where the other column stays meanwhile
+    low, high = (float(_sampled(both, held).mean()) for held in (own.low, own.high))
+    assert high - low == pytest.approx(own.change, rel=0.1)
+    assert "where `angle` is " in effect_line(alone, both.effects)
 
 
 def _second(told: Ends) -> dict[str, float]:

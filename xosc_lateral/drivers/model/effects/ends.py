@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.effects.base import ColumnEffect
+from xosc_lateral.drivers.model.effects.base import ColumnEffect, Effect
 
 ALIKE = 1e-6  # Share of the largest change by which values of a column count as doing the same. [-]
 
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """From where to where the first column goes, NaN: none; where the second stays; what is different then."""
+    """From where to where the first column goes, NaN: none; where the others stay; what is different then."""
 
     low: Mapping[str, float]
     high: Mapping[str, float]
@@ -26,35 +26,51 @@ class Ends:
     scatter: float = 0.0  # Standard deviation of the change between drivers. [m] or natural logarithm
 
 
-def ends_of(effect: ColumnEffect) -> Ends | None:
+def ends_of(effect: ColumnEffect, profile: Iterable[Effect] = ()) -> Ends | None:
     """Where an effect is weakest and strongest among the values that it was fitted on (`driven`); None: not known.
 
     Of two columns, where the second lets the first do most; and what the first does at the second's other end.
+    What others of a `profile` do by the same columns comes with it, a product beside what its columns do alone: it is
+    said of all together, for that is what the profile does. Columns that only the others read stay in the middle.
     """
     if not effect.driven or not effect.coefficients:
         return None
-    columns, grids = effect.columns, [np.array(values, dtype=np.float64) for values in effect.driven]
+    together = [effect, *(one for one in profile if isinstance(one, ColumnEffect) and _goes_along(one, effect))]
+    grids = [np.array(values, dtype=np.float64) for values in effect.driven]
     points = np.stack([part.ravel() for part in np.meshgrid(*grids, indexing="ij")])
-    responses = effect.settled(dict(zip(columns, points, strict=True)))
-    table = effect.weighed(responses).reshape(len(grids[0]), -1)
+    places = dict(zip(effect.columns, points, strict=True))
+    for other in together:
+        for name, values in zip(other.columns, other.driven, strict=True):
+            places.setdefault(name, np.full(points.shape[1], np.array(values, dtype=np.float64)[len(values) // 2]))
+    responses = [one.settled({name: places[name] for name in one.columns}) for one in together]
+    strengths = [one.weighed(response) for one, response in zip(together, responses, strict=True)]
+    table = np.sum(strengths, axis=0).reshape(len(grids[0]), -1)
     beside, size = int(np.argmax(np.ptp(table, axis=0))), table.shape[1]
     low, high = _outermost(table[:, beside])
     change = float(table[high, beside] - table[low, beside])
-    contrast = responses[high * size + beside] - responses[low * size + beside]
-    other = int(np.argmax(np.abs(table[high] - table[low] - change)))
+    contrasts = [response[high * size + beside] - response[low * size + beside] for response in responses]
+    other_end = int(np.argmax(np.abs(table[high] - table[low] - change)))
 
     def held(row: int, column: int) -> dict[str, float]:
-        return dict(zip(columns, points[:, row * size + column].tolist(), strict=True))
+        return {name: float(values[row * size + column]) for name, values in places.items()}
 
     return Ends(
         held(low, beside),
         held(high, beside),
         change,
-        float(np.linalg.norm(contrast * np.asarray(effect.errors))),
-        float(table[high, other] - table[low, other]) if size > 1 else 0.0,
-        held(high, other) if size > 1 else None,
-        float(np.linalg.norm(contrast * np.asarray(effect.between_drivers))) if effect.between_drivers else 0.0,
+        float(
+            np.linalg.norm([np.linalg.norm(apart * one.errors) for apart, one in zip(contrasts, together, strict=True)])
+        ),
+        float(table[high, other_end] - table[low, other_end]) if size > 1 else 0.0,
+        held(high, other_end) if size > 1 else None,
+        float(np.linalg.norm(contrasts[0] * np.asarray(effect.between_drivers))) if effect.between_drivers else 0.0,
     )
+
+
+def _goes_along(other: ColumnEffect, effect: ColumnEffect) -> bool:
+    """Whether another effect of a profile, of known ends, does something of the same by a column that both read."""
+    known = other.acts is effect.acts and bool(other.driven and other.coefficients)
+    return known and not set(other.columns).isdisjoint(effect.columns) and other != effect
 
 
 def _outermost(strength: FloatArray) -> tuple[int, int]:

@@ -54,7 +54,8 @@ class ColumnTerm(Term):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between the ends of its column."""
         effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
-        on_mean, ends = effect.acts is Acts.LOCATION, ends_of(effect)
+        profile = [one for _, own in fitted.estimates.values() for one in own]
+        on_mean, ends = effect.acts is Acts.LOCATION, ends_of(effect, profile)
         assert ends is not None
         size = ends.change if on_mean else float(np.exp(ends.change))
         return Description(
@@ -63,7 +64,7 @@ class ColumnTerm(Term):
             size_m=size,
             size_error=ends.error * (1.0 if on_mean else size),
             statistic=f"{self.group} by effect: {key}",
-            measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect's own quantity",
+            measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect",
             lag_s=effect.lag_s,
             response_s=effect.response_s,
             ends=ends,

@@ -165,7 +165,12 @@ class RegimesTerm(Term):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor and mean lengths."""
         effect = proper(effects, Regimes)
-        shape = f"on for {effect.on_s:.0f} s, off for {effect.off_s:.0f} s on average"
+        longest = float(np.bincount(fitted.coarse.drive, fitted.coarse.valid.astype(np.float64)).max())
+        on, off = (
+            f"{lasts:.0f} s on average" if lasts < longest else "longer than a drive lasts"
+            for lasts in (effect.on_s, effect.off_s)
+        )
+        shape = f"on for {on}, off for {off}"
         return Description(
             "on/off regimes", shape, effect.factor, effect.factor_error, statistic="quantiles of local spread"
         )

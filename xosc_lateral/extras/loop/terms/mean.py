@@ -19,9 +19,8 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.effects import Acts, Angular, ColumnEffect, Effect, Product, Proximity
+from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Product, Proximity
 from xosc_lateral.drivers.model.effects.ends import ends_of
-from xosc_lateral.drivers.model.effects.shapes import SingleColumnEffect
 from xosc_lateral.extras.loop import refinement
 from xosc_lateral.extras.loop.autocorrelation import Problem
 from xosc_lateral.extras.loop.candidates import shapes_of
@@ -32,7 +31,7 @@ from xosc_lateral.extras.loop.drives import OwnSlopes, own_slopes
 from xosc_lateral.extras.loop.low_frequencies import penalised
 from xosc_lateral.extras.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
 from xosc_lateral.extras.loop.omnibus import KERNELS, SECONDS, SMOOTH_COVARIANCE, check_remainder, tents
-from xosc_lateral.extras.loop.passage import Passage, passage_of, typical_passage
+from xosc_lateral.extras.loop.passage import Passage, typical_passage
 from xosc_lateral.extras.loop.terms.column import driven_values, of_kind
 from xosc_lateral.extras.loop.timeline import Coarse, coarse_mean
 
@@ -84,17 +83,14 @@ class MeanTerm(SearchedTerm):
         return isinstance(other, MeanTerm) and self.columns == other.columns
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
-        """Change over the driving range; of one column also what the car does in a typical passage."""
-        described, effect, slopes = super().describe(fitted, effects, key), effects[0], self.own_slopes(fitted)
+        """Change between the ends of its column; where drives surely differ, in those in which it surely acts."""
+        described, slopes = super().describe(fitted, effects, key), self.own_slopes(fitted)
         if slopes is not None and slopes.differ:
             described = replace(described, own_slopes=slopes)
             if slopes.there:
                 size, error = described.size_m * slopes.size_there, abs(described.size_m) * slopes.error_there
                 described = replace(described, size_m=size, size_error=error)
-        if not isinstance(effect, SingleColumnEffect) or isinstance(effect, Angular) or effect.episode:
-            return described
-        share = described.size_error / max(abs(described.size_m), 1e-12)
-        return replace(described, passage=passage_of(fitted.coarse, effect, share))
+        return described
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""
@@ -266,7 +262,7 @@ class CourseTerm(MeanTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """One effect with a course; its weights' error as that of what they do in a typical passage."""
         sizes, covariance = self._weights(fitted)
-        weights = KERNELS.T @ sizes
+        weights, (size, error) = KERNELS.T @ sizes, self._passage(fitted, sizes, covariance).largest_shift
         total = max(float(np.abs(weights).sum()), 1e-300)
         course = tuple((float(late), float(one / total)) for late, one in zip(SECONDS, weights, strict=True))
         sized = structs.replace(self.effect, course=course, response_range=())
@@ -275,7 +271,7 @@ class CourseTerm(MeanTerm):
             sized,
             acts=Acts.LOCATION,
             coefficients=tuple(total * np.asarray(self.mix)),
-            errors=tuple(total * np.abs(self.mix) * self._passage(fitted, sizes, covariance).share_of_error),
+            errors=tuple(total * np.abs(self.mix) * error / max(abs(size), 1e-12)),
             reference=tuple(response.mean(axis=0)),
             response_range=tuple(zip(response.min(axis=0).tolist(), response.max(axis=0).tolist(), strict=True)),
             driven=driven_values(fitted.coarse, self.columns),
