@@ -31,7 +31,7 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.extras.detect.band import band_in, keeping_spectrum, seen_through
+from xosc_lateral.extras.detect.band import keeping_spectrum, seen_through, spectrum_in
 from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
 from xosc_lateral.extras.detect.logistic import (
     ROW_STRIDE,
@@ -211,8 +211,9 @@ def shipped_home(seed: int, *, banded: bool) -> Views:
             _, lifelike = sources_of(
                 varied_scenarios(folder, SHIPPED, seed), SourceSettings(convert, 1, (SHIPPED,), "none")
             )
-            sensor = dataclasses.replace(PERFECT_SENSOR, band=band_in(read_profile(SHIPPED)))
-            return views_without_observers(checked(lifelike), sensor)
+            scenes = list(checked(lifelike))
+            sensor = seen_through(spectrum_in(read_profile(SHIPPED)), scenes, PERFECT_SENSOR)
+            return views_without_observers(scenes, sensor)
         for template, count in SCENARIOS.items():
             scenario, _ = xl.write_template(template, folder / template)
             _, lifelike = sources_of(scenario, SourceSettings(convert, count, (SHIPPED,), "none"))

@@ -85,18 +85,17 @@ def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) ->
     return replace(sensor, band=band_of(recorded, home))
 
 
-SEEN = "seen_through"
-"""Key of a profile's record: at which frequencies [Hz] its recording shows which share of the amplitude. [-]"""
+RECORDED = "recorded_spectrum"
+"""Key of a profile's record: the spectrum of its recording."""
 
 
-def band_in(profile: DriverProfile) -> Band:
-    """The band of a profile's recording, from its record; raises `DriverProfileError` where that holds none."""
-    seen: Any = profile.provenance.fit.get(SEEN)
+def spectrum_in(profile: DriverProfile) -> Spectrum:
+    """Of lane keeping in a profile's recording, from its record; `DriverProfileError`: that holds none."""
+    known: Any = profile.provenance.fit.get(RECORDED)
     try:
-        frequency, gain = (np.array(seen[name], dtype=np.float64) for name in ("frequency_hz", "gain"))
-        rising = frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and len(frequency) == len(gain)
-        if rising and ((gain >= 0.0) & (gain <= 1.0)).all():
-            return Band(frequency, gain)
+        frequency, density = (np.array(known[name], dtype=np.float64) for name in ("frequency_hz", "m2_per_hz"))
+        if frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and (density[: len(frequency)] >= 0.0).all():
+            return Spectrum(frequency, np.broadcast_to(density, frequency.shape), np.zeros(len(frequency), np.int64))
     except (IndexError, KeyError, TypeError, ValueError):  # anybody may write there what they like
         pass
-    raise DriverProfileError(f"{profile.name} does not hold the band of its recording: name the recording")
+    raise DriverProfileError(f"{profile.name} does not hold the spectrum of its recording: name the recording")
