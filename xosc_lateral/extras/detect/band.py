@@ -71,9 +71,9 @@ def keeping_spectrum(tracks: Iterable[LaneTrack], source: str) -> Spectrum:
 
 def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     """What a recording shows of movement like home's: the root of the ratio of both spectra, at most 1."""
-    rows = np.isin(recorded.frequency, home.frequency) & (recorded.frequency > LEAST_FREQUENCY)
-    frequency = recorded.frequency[rows]
-    density = home.density[np.isin(home.frequency, frequency)]
+    both = [np.round(each.frequency, 5) for each in (recorded, home)]  # as a record holds them
+    rows = np.isin(*both) & (recorded.frequency > LEAST_FREQUENCY)
+    frequency, density = recorded.frequency[rows], home.density[np.isin(both[1], both[0][rows])]
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
     return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
