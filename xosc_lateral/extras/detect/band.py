@@ -71,9 +71,9 @@ def keeping_spectrum(tracks: Iterable[LaneTrack], source: str) -> Spectrum:
 
 def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     """What a recording shows of movement like home's: the root of the ratio of both spectra, at most 1."""
-    both = [np.round(each.frequency, 5) for each in (recorded, home)]  # as a record holds them
-    rows = np.isin(*both) & (recorded.frequency > LEAST_FREQUENCY)
-    frequency, density = recorded.frequency[rows], home.density[np.isin(both[1], both[0][rows])]
+    there, here = np.round(recorded.frequency, 5), np.round(home.frequency, 5)  # as a record holds them
+    rows = np.isin(there, here) & (recorded.frequency > LEAST_FREQUENCY)
+    frequency, density = recorded.frequency[rows], home.density[np.isin(here, there[rows])]
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
     return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
