@@ -260,8 +260,6 @@ def results(
                 trained, at_home = out_of_fold(learner_of(one, seed), views, home)
             chosen = [carried(goal, trained, at_home, home) for goal in goals]
             limits = {one.home.goal.text: float(one.limits[one.chosen]) for one in chosen if one.home.met}
-            if not isinstance(one, Detector):
-                limits["p = 0.5"] = 0.0
             for found in at(trained, limits, tested, runs) if limits else ():
                 yield {**key, "detector": name, **found}
         if home != "nominal":
@@ -348,7 +346,7 @@ def main() -> None:
     rows.sort(key=lambda row: [*HOMES[:2], "unsmoothed", *HOMES[2:]].index(row["home"]))
     done = sorted({(row["half"], row["seed"]) for row in rows})
     print(f"{len(done)} of home half and seed: {done}")
-    for goal, marker in (("20/h", "rate"), ("90% 1s", "early"), ("95%", "share"), ("p = 0.5", "half")):
+    for goal, marker in (("20/h", "rate"), ("90% 1s", "early"), ("95%", "share")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
     show(told_lines(rows), args.write, "transfer-told")
     if any(row.get("runs") for row in rows):
