@@ -346,7 +346,8 @@ def main() -> None:
     rows.sort(key=lambda row: [*HOMES[:2], "unsmoothed", *HOMES[2:]].index(row["home"]))
     done = sorted({(row["half"], row["seed"]) for row in rows})
     print(f"{len(done)} of home half and seed: {done}")
-    for goal, marker in (("20/h", "rate"), ("90% 1s", "early"), ("95%", "share")):
+    print(lines_of(rows, "95%"))
+    for goal, marker in (("20/h", "rate"), ("90% 1s", "early")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
     show(told_lines(rows), args.write, "transfer-told")
     if any(row.get("runs") for row in rows):
