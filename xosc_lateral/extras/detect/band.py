@@ -6,9 +6,9 @@ nervous or too calm for the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.evaluation.spectra import SEGMENTS, Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene, truth_of
-
-if TYPE_CHECKING:
-    from xosc_lateral.extras.detect.observation import Sensor
+from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, truth_of
 
 ROWS = round(0.2 / STEP)
 """Rows to one of the spectrum's, whose windows are made for 5 Hz. [rows]"""
@@ -77,12 +74,6 @@ def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
     return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
-
-
-def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
-    """The sensor with the band that a recording leaves of what moves in these scenes."""
-    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
-    return replace(sensor, band=band_of(recorded, home))
 
 
 RECORDED = "recorded_spectrum"

@@ -12,9 +12,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.evaluation.spectra import Spectrum
-from xosc_lateral.extras.detect.band import seen_through
 from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector, Learner
-from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.observation import View, seen_through
 from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
 from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import STEP, Scene
