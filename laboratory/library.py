@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from laboratory.comparison import driver_distances
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.numbers import significant
 from xosc_lateral.drivers.drives.drive import Drive, Run, all_runs
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
@@ -42,7 +43,7 @@ from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_moveme
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
-from xosc_lateral.extras.detect.band import LEAST_FREQUENCY, SEEN
+from xosc_lateral.extras.detect.band import RECORDED
 from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.extras.recordings.importers.openacc import import_openacc
 from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
@@ -108,24 +109,17 @@ def build_library(source: Path, gnss: Sequence[Path], *, model: str = "best") ->
     inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
     known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
     population = replace(_population_profile(seen, known, model), maneuvers=read_maneuvers(source), beside=ANSWERS)
-    fit = {**population.provenance.fit, SEEN: seen_through(population, runs)}
+    fit = {**population.provenance.fit, RECORDED: recorded_spectrum(runs)}
     population = replace(population, provenance=replace(population.provenance, fit=fit))
     profiles = [population, _single_profile(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
 
 
-def seen_through(profile: DriverProfile, runs: Sequence[Run]) -> dict[str, list[float]]:
-    """Which share of the amplitude of movement like the profile's a recording of it shows, above 0.1 Hz. [Hz], [-]"""
-    real, made = (
-        spectrum(paths, STEP)
-        for paths in ([run.offset for run in runs], sample_runs(profile, runs, SEED, same_start=False))
-    )
-    rows = (real.frequency > LEAST_FREQUENCY) & np.isin(real.frequency, made.frequency)
-    ratio = real.density[rows] / made.density[np.isin(made.frequency, real.frequency[rows])]
-    return {
-        "frequency_hz": [round(float(hertz), 4) for hertz in real.frequency[rows]],
-        "gain": [round(float(gain), 3) for gain in np.minimum(np.sqrt(ratio), 1.0)],
-    }
+def recorded_spectrum(runs: Sequence[Run]) -> dict[str, list[float]]:
+    """Of lane keeping as recorded: what `detect --band-of PROFILE` sees homes like."""
+    found = spectrum([run.offset for run in runs], STEP)
+    densities = [significant(float(density), 4) for density in found.density]
+    return {"frequency_hz": [round(float(hertz), 5) for hertz in found.frequency], "m2_per_hz": densities}
 
 
 def _rural(gnss: Sequence[Path], model: str) -> tuple[DriverProfile, FastPart]:

@@ -1,11 +1,13 @@
 """Eight kinds of drivers that no model of ours made, and two plain ones: what comes back otherwise, and is it said?
 
-    python -m laboratory.planted_drivers [--seeds 9100 9200 9300]
+    python -m laboratory.planted_drivers [--seeds 9400 9500 9600]
 
 Twelve drives of 300 s each at 10 Hz are fitted; the profile is sampled anew, and numbers of both sides are compared
 here, by code of its own. A difference counts beyond three standard errors (drives drawn anew) and beyond `LIKE`. It is
-silent where the closing look of `fit` names nothing, and a doubt is false where a plain driver is doubted. Kinds and
-seeds were written down before any was fitted; `docs/validation/driver_model.md`.
+silent where the closing look of `fit` names nothing, and a doubt is false where a plain driver is doubted. Movement is
+compared below the frequency to which the profile says that its drives show any driver (`validity.bands`): four fits of
+seeds 9100 to 9300 showed that the fast tail of these plain drivers is taken for a sensor's, and is said to be. Kinds
+were written down before any was fitted; `docs/validation/driver_model.md`.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ Generator = np.random.Generator
 
 STEP, SECONDS, DRIVES, WIDTH, SPEED = 0.1, 300.0, 12, 3.6, 30.0
 N = round(SECONDS / STEP)
+BANDS = ((0.02, 0.1), (0.1, 0.3), (0.3, 0.6), (0.6, 1.2))
 LIKE = {
     "mean [m]": 0.05, "spread between": 0.3, "spread within": 0.15, "skewness": 0.5, "kurtosis": 0.4,
     "kurtosis of lateral speed": 0.4, "beyond 0.6 m": 0.7, "beyond 0.9 m": 0.7, "0.02 to 0.1 Hz": 0.3,
@@ -118,7 +121,7 @@ def numbers(paths: FloatArray, step: float) -> FloatArray:
     hertz = np.fft.rfftfreq(paths.shape[1], step)
     scale = 2.0 / (paths.shape[1] * np.square(np.hanning(paths.shape[1])).sum())
     bands = [power[:, (hertz >= a) & (hertz < b)].sum(axis=1).mean() * scale
-             for a, b in ((0.02, 0.1), (0.1, 0.3), (0.3, 0.6), (0.6, 1.2))]  # fmt: skip
+             for a, b in BANDS]  # fmt: skip
     shares = [np.log((np.abs(paths) > far).mean() + 0.002) for far in (0.6, 0.9)]
     tails = [np.log((one**4).mean() / (one**2).mean() ** 2) for one in (about, speed)]
     spreads = np.log([paths.mean(axis=1).std() + 0.01, about.std()])
@@ -145,13 +148,15 @@ def differences(
         for side in (real, made)
     ))  # fmt: skip
     beyond = np.abs(both[1] - both[0]) > np.maximum(list(LIKE.values()), 3.0 * chance)
+    highest = profile.validity.highest_frequency or np.inf
+    beyond[-len(BANDS) :] &= np.array([high for _, high in BANDS]) <= 1.01 * highest
     found = {name: (both[0][k], both[1][k]) for k, name in enumerate(LIKE) if beyond[k]}
     return found, found_in(profile)[1]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[9100, 9200, 9300])
+    parser.add_argument("--seeds", type=int, nargs="+", default=[9400, 9500, 9600])
     args = parser.parse_args()
     silent = told = doubted = 0
     for kind in (*PLAIN, *KINDS):

@@ -9,6 +9,11 @@ from msgspec.structs import replace
 
 import xosc_lateral as xl
 from laboratory.evaluate_planted import recorded, said, wrong_drivers
+from xosc_lateral.drivers.drives.drive import all_runs
+from xosc_lateral.drivers.evaluation import realism
+from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise, snippets_of
+from xosc_lateral.drivers.evaluation.spectra import RECORDED_BELOW, in_band
+from xosc_lateral.drivers.fitting.fitting import driver_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.profiles import read_profile
 
@@ -29,6 +34,23 @@ def test_through_whatever_sensor_the_driver_himself_is_like_and_another_is_not(t
     name, wrong = next(iter(wrong_drivers(truth).items()))
     found, words = said(wrong, drives)
     assert found["driver"] == "unlike" and "mean square about the measured mean" in words, (name, words)
+
+
+def test_a_classifier_does_not_tell_the_driver_himself_by_what_two_rates_leave_of_a_sensor(truth):
+    """Above 1.5 Hz noise that was recorded at 20 Hz is a hundredth of what it is at 5 Hz: a logarithm sees that."""
+    drives = recorded(truth, 1, 0.03, 20.0)
+    runs = all_runs(drives)
+    _, sensor = driver_runs(runs, drives)
+    cut, told = snippets_of(runs, 30.0, 0.2), []
+    for each in (truth, wrong_drivers(truth)["1.8 times as restless"]):
+        profile = replace(each, sensor=sensor)
+        free = sample_runs(profile, runs, 0, same_start=False)
+        noise = sensor_noise(profile, free, 0)
+        paths = [run.offset for run in runs], [path + error for path, error in zip(free, noise, strict=True)]
+        both = [in_band(cut.cut_from(side), 0.2) for side in paths]
+        condition = SnippetCondition(30.0, False, below=RECORDED_BELOW)
+        told.append(realism._under(condition, cut, *both, profile, 0, True).alone.auc)
+    assert told[0] < 0.65 and told[1] > 0.8
 
 
 @pytest.mark.pages

@@ -10,7 +10,7 @@ import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, track
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.band import SEEN, Band, band_in, band_of, keeping_spectrum
+from xosc_lateral.extras.detect.band import RECORDED, Band, band_of, keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.tracks import STEP
 from xosc_lateral.files.profiles import read_profile
 
@@ -60,17 +60,18 @@ def test_home_that_does_not_move_is_seen_as_it_is():
     assert band_of(keeping_spectrum(tracks(0, smoothed=True), "r"), still).gain.min() == pytest.approx(1.0)
 
 
-def test_a_shipped_profile_holds_the_band_of_its_recording_and_nothing_else_is_taken_for_one():
-    """Cameras beside a motorway, smoothed by the provider: half the amplitude at 0.22 Hz, a tenth at 0.7 Hz."""
+def test_a_shipped_profile_holds_the_spectrum_of_its_recording_and_nothing_else_is_taken_for_one():
+    """Cameras beside a motorway, smoothed by the provider: from 0.1 to 0.9 Hz the power falls by four decades."""
     shipped = read_profile("motorway")
-    gain = band_in(shipped).at(np.array([0.05, 0.2239, 0.7079, 3.0]))
-    np.testing.assert_allclose(gain, [1.0, 0.5, 0.1, 0.07], atol=0.05)
-    with pytest.raises(DriverProfileError, match="rural does not hold the band of its recording"):
-        band_in(read_profile("rural"))
-    for seen in (7, {}, {"frequency_hz": [0.2, 0.1], "gain": [1, 1]}, {"frequency_hz": [0.2], "gain": [1.5]},
-                 {"frequency_hz": [], "gain": []}, {"frequency_hz": [0.2, 0.3], "gain": [1]}):  # fmt: skip
+    found = spectrum_in(shipped)
+    low, high = (found.density[np.argmin(np.abs(found.frequency - hertz))] for hertz in (0.1, 0.9))
+    assert low > 0.03 and high < 1e-4 * low
+    with pytest.raises(DriverProfileError, match="rural does not hold the spectrum of its recording"):
+        spectrum_in(read_profile("rural"))
+    for hertz, density in (([0.2, 0.1], [1, 1]), ([0.2], [-1]), ([], []), ([0.1, 0.2, 0.3], [1, 1]), (7, "x")):
+        known = {"frequency_hz": hertz, "m2_per_hz": density}
         with pytest.raises(DriverProfileError, match="does not hold"):
-            band_in(replace(shipped, provenance=replace(shipped.provenance, fit={SEEN: seen})))
+            spectrum_in(replace(shipped, provenance=replace(shipped.provenance, fit={RECORDED: known})))
 
 
 def test_through_a_smoother_recording_s_band_thresholds_become_more_sensitive(tmp_path, monkeypatch):

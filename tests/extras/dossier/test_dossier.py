@@ -37,10 +37,12 @@ def read(monkeypatch):
 def test_what_is_known_of_verdicts_on_the_road_is_what_the_page_of_detectors_shows():
     rows = dict(contents_of(None).verdict)
     text = (ROOT / "docs" / "validation" / "detectors.md").read_text(encoding="utf-8")
-    table = text.split("<!-- transfer-share: begin -->")[1].split("<!-- transfer-share: end -->")[0]
+    table = text.split("<!-- transfer-early: begin -->")[1].split("<!-- transfer-early: end -->")[0]
     for line in table.strip().splitlines()[2:]:
-        name, written, lifelike, real = (cell.strip() for cell in line.strip("|").split("|"))
-        assert rows[name] == f"as written: {written}. Lifelike: {lifelike}. Real: {real}."
+        name, written, lifelike, _, without, real = (cell.strip() for cell in line.strip("|").split("|"))
+        assert rows[name] == (
+            f"as written: {written}. Lifelike: {lifelike}. Without a recording: {without}. Real: {real}."
+        )
     assert "which had no part in profile, lane changes, training or threshold" in rows["protocol"]
 
 

@@ -172,9 +172,11 @@ def _under(
     made = snippets.features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, measured, made, real, cut.group, seed)
     alone = jointly = floor = None
-    shown = (real, sampled)
-    if condition.slow:
-        shown = spectra.thinned(real, step, condition.below), spectra.thinned(sampled, step, condition.below)
+    stop = condition.below if condition.slow else spectra.CLASSIFIED_BELOW
+    shown = [
+        spectra.thinned(rows if condition.slow else spectra.in_band(rows, step, stop), step, stop)
+        for rows in (real, sampled)
+    ]
     if classify and shown[0].shape[1] >= MINIMUM_ROWS:
         fast, group = not condition.slow, cut.group
         alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)

@@ -119,9 +119,14 @@ RECORDED_BELOW = 1.5
 """Band in which recordings are compared: above, rows at 5 Hz hold what faster ones lose on being resampled. [Hz]"""
 
 
-def in_band(paths: FloatArray, step: float) -> FloatArray:
-    """Paths, shape (n, m) [m], without what is faster than `RECORDED_BELOW`, each by itself."""
-    return np.array([slow_movement(path, step, RECORDED_BELOW) for path in paths]).reshape(paths.shape)
+CLASSIFIED_BELOW = 1.25
+"""The same of a classifier: rows thinned by two hold nothing above, where a filter's last hundredth tells a sensor's
+error that was recorded at 20 Hz from one at 5 Hz. [Hz]"""
+
+
+def in_band(paths: FloatArray, step: float, stop: float = RECORDED_BELOW) -> FloatArray:
+    """Paths, shape (n, m) [m], without what is faster than a frequency [Hz], each by itself."""
+    return np.array([slow_movement(path, step, stop) for path in paths]).reshape(paths.shape)
 
 
 def thinned(paths: FloatArray, step: float, stop: float = STOP_FREQUENCY) -> FloatArray:

@@ -6,9 +6,9 @@ nervous or too calm for the other.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.evaluation.spectra import SEGMENTS, Spectrum, spectrum
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene, truth_of
-
-if TYPE_CHECKING:
-    from xosc_lateral.extras.detect.observation import Sensor
+from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, truth_of
 
 ROWS = round(0.2 / STEP)
 """Rows to one of the spectrum's, whose windows are made for 5 Hz. [rows]"""
@@ -71,32 +68,25 @@ def keeping_spectrum(tracks: Iterable[LaneTrack], source: str) -> Spectrum:
 
 def band_of(recorded: Spectrum, home: Spectrum) -> Band:
     """What a recording shows of movement like home's: the root of the ratio of both spectra, at most 1."""
-    rows = np.isin(recorded.frequency, home.frequency) & (recorded.frequency > LEAST_FREQUENCY)
-    frequency = recorded.frequency[rows]
-    density = home.density[np.isin(home.frequency, frequency)]
+    there, here = np.round(recorded.frequency, 5), np.round(home.frequency, 5)  # as a record holds them
+    rows = np.isin(there, here) & (recorded.frequency > LEAST_FREQUENCY)
+    frequency, density = recorded.frequency[rows], home.density[np.isin(here, there[rows])]
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
     return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
 
 
-def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
-    """The sensor with the band that a recording leaves of what moves in these scenes."""
-    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
-    return replace(sensor, band=band_of(recorded, home))
+RECORDED = "recorded_spectrum"
+"""Key of a profile's record: the spectrum of its recording."""
 
 
-SEEN = "seen_through"
-"""Key of a profile's record: at which frequencies [Hz] its recording shows which share of the amplitude. [-]"""
-
-
-def band_in(profile: DriverProfile) -> Band:
-    """The band of a profile's recording, from its record; raises `DriverProfileError` where that holds none."""
-    seen: Any = profile.provenance.fit.get(SEEN)
+def spectrum_in(profile: DriverProfile) -> Spectrum:
+    """Of lane keeping in a profile's recording, from its record; `DriverProfileError`: that holds none."""
+    known: Any = profile.provenance.fit.get(RECORDED)
     try:
-        frequency, gain = (np.array(seen[name], dtype=np.float64) for name in ("frequency_hz", "gain"))
-        rising = frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and len(frequency) == len(gain)
-        if rising and ((gain >= 0.0) & (gain <= 1.0)).all():
-            return Band(frequency, gain)
+        frequency, density = (np.array(known[name], dtype=np.float64) for name in ("frequency_hz", "m2_per_hz"))
+        if frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and (density[: len(frequency)] >= 0.0).all():
+            return Spectrum(frequency, np.broadcast_to(density, frequency.shape), np.zeros(len(frequency), np.int64))
     except (IndexError, KeyError, TypeError, ValueError):  # anybody may write there what they like
         pass
-    raise DriverProfileError(f"{profile.name} does not hold the band of its recording: name the recording")
+    raise DriverProfileError(f"{profile.name} does not hold the spectrum of its recording: name the recording")

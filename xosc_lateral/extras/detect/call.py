@@ -104,7 +104,7 @@ def detect(
     """
     from dataclasses import replace as replaced
 
-    from xosc_lateral.extras.detect.band import band_in, keeping_spectrum
+    from xosc_lateral.extras.detect.band import keeping_spectrum, spectrum_in
     from xosc_lateral.extras.detect.cut_ins import cut_ins_like
     from xosc_lateral.extras.detect.detection import Detection, count_all
     from xosc_lateral.extras.detect.logistic import TRAINED_RULE, read_detectors, train_all
@@ -158,13 +158,10 @@ def detect(
     if goal is None:
         tried = train_all(chosen, homes, settings)
     else:
-        at_home, recorded = settings, None
-        if band_of is not None and not bands:
-            through = band_in(given_profile(band_of, library))
-            at_home = replaced(settings, sensor=replaced(settings.sensor, band=through))
+        recorded = spectrum_in(given_profile(band_of, library)) if band_of is not None and not bands else None
         for source in [one for path in bands for one in sources_of(path, as_they_are)]:
             recorded = keeping_spectrum((one for scene in checked(source) for one in scene.tracks), source.label)
-        tried, done_there = tune_all(goal, chosen, homes, looked_at, at_home, recorded)
+        tried, done_there = tune_all(goal, chosen, homes, looked_at, settings, recorded)
     if like is not None:
         part, law = (1, 1) if shard is None else read_shard(shard), given_profile(like, library)
         where = None if keep is None else Path(keep)

@@ -236,7 +236,7 @@ def count_all(
                 tally.add(scene, views)
         tallies += sorted(
             [*mine, *itself],
-            key=lambda one: (titles.index(one.detector.title()), order.index(one.detector.home_source)),
+            key=lambda tally: (titles.index(tally.detector.title()), order.index(tally.detector.home_source)),
         )
     return tallies, frozenset(still)
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.rates import rate
 from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW
+from xosc_lateral.drivers.evaluation.spectra import Spectrum
 from xosc_lateral.drivers.model.seeds import of_name
-from xosc_lateral.extras.detect.band import Band
+from xosc_lateral.extras.detect.band import Band, band_of, keeping_spectrum
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Rows, Scene, Truth, truth_of
 
 # Lateral speed is the change of position over the last `RATE_WINDOW`, lateral acceleration that of the lateral speed:
@@ -54,6 +55,12 @@ def read_sensor(text: str) -> Sensor:
     limits = {"noise": (0.0, 2.0), "delay": (0.0, 5.0), "rate": (0.5, 1.0 / STEP)}
     numbers = read_numbers(text, limits, "a sensor")
     return Sensor(numbers.get("noise", 0.0), numbers.get("delay", 0.0), numbers.get("rate", 1.0 / STEP))
+
+
+def seen_through(recorded: Spectrum, scenes: Sequence[Scene], sensor: Sensor) -> Sensor:
+    """The sensor with the band that a recording leaves of what moves in these scenes."""
+    home = keeping_spectrum((track for scene in scenes for track in scene.tracks), scenes[0].name)
+    return replace(sensor, band=band_of(recorded, home))
 
 
 def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str) -> dict[str, float]:

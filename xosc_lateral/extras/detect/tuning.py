@@ -12,9 +12,8 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.evaluation.spectra import Spectrum
-from xosc_lateral.extras.detect.band import seen_through
 from xosc_lateral.extras.detect.detectors import NO_DANGER, Detector, Learner
-from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.observation import View, seen_through
 from xosc_lateral.extras.detect.scoring import Curve, Tally, cut_ins_of
 from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import STEP, Scene
@@ -175,7 +174,7 @@ def tune_all(
     labels = [source.label for source in homes]
     if twice := sorted({label for label in labels if labels.count(label) > 1}):
         raise ValueError(f"two homes are called {twice[0]!r}, which rows could not tell apart")
-    found, at_home = list[Detector](), dict[str, list[Tally]]()
+    carriers, at_home = list[Detector](), dict[str, list[Tally]]()
     with_observers = any(isinstance(one, Detector) and one.needs_observer for one in chosen)
     for source in homes:
         scenes = list(checked(source))
@@ -183,15 +182,15 @@ def tune_all(
             settings, sensor=seen_through(recorded, scenes, settings.sensor)
         )  # fmt: skip
         views = [(scene, seen.views(scene, with_observers=with_observers)) for scene in scenes]
-        for one in chosen:
-            if isinstance(one, Detector):
-                trained, every = one, scored(one, views)
+        for detector in chosen:
+            if isinstance(detector, Detector):
+                trained, every = detector, scored(detector, views)
             else:
-                trained, every = out_of_fold(one, views, source.label)
-            found.append(carried(goal, trained, every, source.label))
+                trained, every = out_of_fold(detector, views, source.label)
+            carriers.append(carried(goal, trained, every, source.label))
             if any(map(source.is_same, tried_on)):
                 at_home.setdefault(source.label, []).append(carried_within(goal, trained, every, source.label))
-    return found, at_home
+    return carriers, at_home
 
 
 def out_of_fold(learner: Learner, views: Views, source: str) -> tuple[Detector, list[Scored]]:
