@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive
-from xosc_lateral.drivers.drives.evidence import of_clock
+from xosc_lateral.drivers.drives.evidence import UNIT_SIZES, of_clock
 from xosc_lateral.drivers.drives.markings import both_markings
 
 MAX_STEP = 0.25
@@ -224,9 +224,11 @@ def position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]
     return (right - left) / 2, right + left
 
 
-def _in_centimetres(columns: Mapping[str, FloatArray]) -> str:
-    columns_named = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
-    return " ".join(f"{name}=COLUMN:cm" for name in columns_named)
+def _unit_named(columns: Mapping[str, FloatArray], width: float) -> str:
+    """Options that make a lane of it."""
+    named = ("lane_width",) if "lane_width" in columns else ("distance_left", "distance_right")
+    unit = next((unit for unit, by in UNIT_SIZES.items() if LANE_WIDTHS[0] <= width / by <= LANE_WIDTHS[1]), "cm")
+    return " ".join(f"{name}=COLUMN:{unit}" for name in named)
 
 
 def _check_units(
@@ -240,7 +242,7 @@ def _check_units(
     if not LANE_WIDTHS[0] <= median_width <= LANE_WIDTHS[1]:
         raise FormatError(
             f"drive {name}: the lane is {median_width:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to "
-            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in {_in_centimetres(columns)}",
+            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in {_unit_named(columns, median_width)}",
             path=path,
         )
     outside = np.abs(offset) > np.maximum(width, LANE_WIDTHS[0])

@@ -23,6 +23,7 @@ from xosc_lateral.base.rows import blocks
 from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course
+from xosc_lateral.files.mapping import COMPASS
 from xosc_lateral.world.road.network import RoadNetwork
 
 KEPT_ROWS = "kept"
@@ -177,7 +178,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
         CLOCKWISE: -heading,
         NORTH: 0.5 * np.pi - heading,
         "in degrees, " + CLOCKWISE: -np.radians(heading),
-        "in degrees, " + NORTH: 0.5 * np.pi - np.radians(heading),
+        f"in degrees, {NORTH}, heading=COLUMN:{COMPASS}": 0.5 * np.pi - np.radians(heading),
     }
     shares = {name: _share(np.cos(other - way)[moving] < HEADING_AGREEMENT) for name, other in meant.items()}
     likely = min(shares, key=lambda name: shares[name])

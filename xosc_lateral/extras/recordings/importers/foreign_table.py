@@ -14,7 +14,7 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, paths_of
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
-from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.tables import read_table, tables_at
 
 
@@ -28,7 +28,7 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
         read = read_table(path, known)
         table = translated(read, known, path)
         lost["not chosen"] += len(read) - len(table)
-        drives += drives_of_table(table, TableMapping(), path, lost)
+        drives += drives_of_table(table, known, path, lost, is_translated=True)
         names = np.empty(len(table), dtype=object)
         for name, rows in rows_of_drives(table, path, label):
             names[rows] = name

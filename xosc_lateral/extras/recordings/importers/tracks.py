@@ -78,8 +78,10 @@ def import_tracks(
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
     require_lanes(placed, Path(road).name, source)
-    sources = [source, Path(road)]
-    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE)
+    sources, beside = [source, Path(road)], 100 * float((placed.piece < 0).mean())
+    far = f"{beside:.0f} % of the rows lie in no lane: are the road and x, y in the same coordinates and units?"
+    notes = [far] if beside > 50 else []
+    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE, notes=notes)
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
