@@ -117,7 +117,7 @@ LAYOUTS = {
         ngsim,
         {"x": "Global_X:ft", "y": "Global_Y:ft", "length": "v_Length:ft", "width": "v_Width:ft",
          "speed": "v_Vel:ft/s"},
-        ("[values.vehicle_class]", '1 = "motorcycle"', '2 = "car"', '3 = "truck"'), "front",
+        reference="front",
     ),
     "Argoverse 2": Layout(argoverse, {"time": "timestep:1/25 s"}, file="bent.parquet", has_length=False),
     "Waymo": Layout(waymo, lines=("[values.vehicle_class]", '"TYPE_VEHICLE" = "car"')),

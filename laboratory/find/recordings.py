@@ -349,14 +349,14 @@ def read(spec: Spec, case: kit.Case, words: list[str], bend: Bend, folder: Path)
             code: Any = command([*words, "-o", str(out), "--force"])
         except SystemExit as ended:
             code = ended.code
-    text = said.getvalue()
+    text = said.getvalue().partition("licence:")[0]
     if code:
         return (None if "Traceback" not in text else "traceback"), text
     table = pd.read_parquet(out)
     if spec["layout"] == "table":  # as fits read it
         table = pd.concat([as_frame(drive) for drive in read_drives(out)])
         return differs(table, drive_table(case), spec, bend), text
-    found = {name.rpartition(":")[2]: part for name, part in table.groupby("drive")}
+    found = {re.split("[:-]", str(name))[-1]: part for name, part in table.groupby("drive")}
     car = next((found[one] for one in ("car", "1", "901") if one in found), None)
     if car is None:
         return "vehicle", text

@@ -192,8 +192,8 @@ def require_evidence(
     known = np.isfinite(offset + width)
     if known.any():
         farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))
-        seen = map(np.concatenate, zip(*jumps, strict=True))
-        wrong = evidence.of_lane_changes(*seen, median, farthest)
+        each = (np.concatenate(parts) for parts in zip(*jumps, strict=True))
+        wrong = evidence.of_lane_changes(next(each), next(each), next(each), median, farthest)
         wrong = wrong or (None if "offset" in named else evidence.of_places(offset, width))
         if wrong:
             raise FormatError(wrong, path=path, element="column 'offset'")

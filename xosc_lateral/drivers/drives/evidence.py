@@ -3,8 +3,8 @@
 Each question gives a line with the option that mends it, or None. What contradicts itself is refused by who asks; what
 only makes results worse is a note. Limits are where the two readings part, not how far real driving goes:
 
-- unit, side and origin of the offset: two lane changes that agree, within 15 % of a lane's width; of 130 motorway vehicles with
-  two, 128 are found when turned or written in feet, and none of 445 and 567 real ones is as it is;
+- unit, side and origin of the offset: two lane changes that agree, within 15 % of a lane's width; of 130 motorway
+  vehicles with two, 128 are found when turned or written in feet, and none of 445 and 567 real ones is as it is;
 - rows in turns: twice the change from row to row that there is over several; white noise gives 1;
 - clock: 1 kHz to one row in 2 s; minutes: sideways at 0.3 m/s in the median, where drivers keep lanes at 0.1;
 - shift of a map: two standard deviations of 445 real vehicles' mean offsets, 0.42 m, or half of it between the two

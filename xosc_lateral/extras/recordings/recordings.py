@@ -16,7 +16,7 @@ from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import require_along_lanes
 from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
-from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
+from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
 from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
@@ -37,7 +37,6 @@ REAR_AXLE = 0.3  # middle of a vehicle ahead of its rear axle, as a share of its
 GATE_ROWS = 20_000  # so many rows tell whether a recording drives along its lanes [-]
 MAXIMUM_LENGTH = 60.0  # of vehicles with all that they pull: road trains have 53.5 m [m]
 MAXIMUM_WIDTH = 6.0  # of what drives on roads, heavy transports included [m]
-ROAD_MARGIN = 50.0  # a made road goes on so far beyond its traffic [m]
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
 """Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
 USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
@@ -279,31 +278,10 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
-    table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
-    if "xCenter" in table.columns:  # exiD, inD, rounD, uniD
-        kinds = recording.classes(meta.set_index("trackId").reindex(table["trackId"]))
-        named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
-        return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
-    recording.require(levelx.HIGHD_COLUMNS)
-    lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
-    table = recording.identified("id", "x", "y")
-    meta = meta.set_index("id").loc[table["id"]]
-    kind = recording.classes(meta)
-    is_ahead = meta["drivingDirection"].to_numpy() == 2
-    time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
-    x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
-    place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
-    when = tuple(table["name"].unique()), table["vehicle"].to_numpy(), time, 1.0 / rate
-    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy(), dropped=recording.dropped)
-    middle = 0.5 * (upper[-1] + lower[0])
-    sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
-    left, right = (
-        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]
-        for inner, widths in sides
-    )
-    x0 = float(np.floor(table["x"].min() - ROAD_MARGIN))
-    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + ROAD_MARGIN)) - x0]])
-    return _made(WrittenRoad(f"highd-{recording.number}", plan, left, right), tracks, files[0])
+    if not recording.is_highd:
+        return _on_road(levelx.tracks_in(recording), files[0], road)
+    made, tracks, _ = levelx.on_its_road(recording)
+    return _made(made, tracks, files[0])
 
 
 def _short(names: NDArray[np.str_]) -> dict[str, str]:

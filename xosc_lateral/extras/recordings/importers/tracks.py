@@ -60,6 +60,11 @@ class PlacedTracks:
     road: Mapping[str, FloatArray] = field(default_factory=dict)  # columns that it has there: curvature, lane_index ...
     scale: FloatArray | float = 1.0  # metres along the lane per metre of `along` [-]
 
+    def notes(self) -> tuple[str, ...]:
+        """Those of the tracks, and whether they lie beside their lanes."""
+        shift = of_registration(self.offset, self.lane_width, self.tracks.vehicle, self.tracks.heading)
+        return (*self.tracks.notes, *([shift] if shift else []))
+
 
 @importer
 def import_tracks(
@@ -78,10 +83,8 @@ def import_tracks(
     network = read_opendrive(road)
     placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
     require_lanes(placed, Path(road).name, source)
-    sources, beside = [source, Path(road)], 100 * float((placed.piece < 0).mean())
-    far = f"{beside:.0f} % of the rows lie in no lane: are the road and x, y in the same coordinates and units?"
-    notes = [far] if beside > 50 else []
-    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE, notes=notes)
+    sources, far = [source, Path(road)], mostly_beside(placed)
+    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE, notes=far)
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
@@ -111,6 +114,13 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, scale), lanes.graph
 
 
+def mostly_beside(placed: PlacedTracks) -> list[str]:
+    """A line, where a road that was given holds less than half of the rows."""
+    beside = 100 * float((placed.piece < 0).mean())
+    far = f"{beside:.0f} % of the rows lie in no lane: are the road and x, y in the same coordinates and units?"
+    return [far] if beside > 50 else []
+
+
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
     """Refuse tracks that lie beside all lanes, or drive against them. Raises `FormatError`."""
     require_lane_direction(placed.agreement, placed.tracks.speed, where, path)
@@ -128,18 +138,18 @@ def import_placed(
     if placed.tracks.step > MAX_GAP:
         what = f"rows are {placed.tracks.step:.4g} s apart (median): from {MAX_GAP:g} s on no drive can be made of them"
         raise FormatError(what, path=about["sources"][0], element="column 'time'")
-    table = _drive_table(placed, graph, settings)
+    table = drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
     tracks = placed.tracks
-    shift = of_registration(placed.offset, placed.lane_width, tracks.vehicle, tracks.heading)
-    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes, *([shift] if shift else []))))
+    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *placed.notes())))
     return imported(
         table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
     )  # fmt: skip
 
 
-def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+def drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+    """The standard columns, with `state`: which rows are cut, and why."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, list(TRUCKS))
     middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
