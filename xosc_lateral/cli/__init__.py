@@ -168,6 +168,10 @@ SIBLINGS = {
 """Verb -> what others call it, Python's calls among them."""
 
 
+GONE = {"--propose": "check TABLE... --write-mapping MAPPING.toml does that"}
+"""Option that there was -> what takes its place."""
+
+
 def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     """What to write in place of words that are wrong usage, where that can be told from them."""
     first = next(iter(words), "")
@@ -177,6 +181,7 @@ def _cures(words: Sequence[str], wrong: str) -> Iterator[str]:
     elif first not in VERBS and not first.startswith("-"):
         name = first.replace("_", "-").lower()
         yield from (f"{verb!r} does that" for verb, others in SIBLINGS.items() if name in others)
+    yield from (f"{option} is gone: {instead}" for option, instead in GONE.items() if option in words)
     if "'--profile'" in wrong and "Missing" in wrong:
         yield f"the profile is named by -p, as in {first} -p motorway or -p PROFILE.json"
     if "not a valid float" in wrong:

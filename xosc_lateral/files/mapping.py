@@ -13,7 +13,7 @@ count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Be
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -203,8 +203,8 @@ def classes_of(words: pd.Series, path: Path, column: str) -> pd.Series:
     return words.map(known)
 
 
-MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | str | Path"
-"""A mapping, words or sources by name as of ``--map``, or the file of one."""
+MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | Sequence[str] | Path"
+"""A mapping, words or sources by name, words as of ``--map``, or the file of one."""
 
 
 def as_mapping(mapping: MappingLike | None) -> TableMapping:
@@ -215,6 +215,8 @@ def as_mapping(mapping: MappingLike | None) -> TableMapping:
         return mapping
     if isinstance(mapping, str | Path):
         return read_mapping(Path(mapping))
+    if not isinstance(mapping, Mapping):
+        return TableMapping(parse_map(mapping))
     words = {name: entry for name, entry in mapping.items() if isinstance(entry, str)}
     sources = {name: entry for name, entry in mapping.items() if isinstance(entry, ColumnSource)}
     return TableMapping(sources).with_words(words)

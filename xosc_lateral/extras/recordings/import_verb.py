@@ -91,7 +91,7 @@ def _add(
     kind: Any = list[Path] if metavar.endswith("...") else Path
 
     def run(sources: Any, *, options: Options, table: _Table) -> None:
-        if name == "mf4" and not options.keys() & {"channels", "mapping"}:
+        if name == "mf4" and not options["columns"].columns:
             from xosc_lateral.extras.recordings.importers.mf4 import channels_wanted
 
             raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
@@ -138,28 +138,13 @@ _add(
 
 @command(
     group, "table", "Tables of drives under other names.",
-    "import table --propose monday.csv > company.toml", "import table *.csv --mapping company.toml -o drives.parquet",
+    "import table *.csv --mapping company.toml -o drives.parquet",
 )
 def table_(
     sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
     *,
-    output: Annotated[str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table, or - .")] = "-",
     mapped: Mapped,
-    propose: Annotated[bool, typer.Option("--propose",
-        help="Write the first version of a mapping of these tables, with comments.")] = False,
-    reply: Written,
+    table: _Table,
 ) -> None:
     """Tables of drives under a company's own names, units and words, by a saved mapping."""
-    if not propose:
-        table = _Table(output=output, quiet=reply.quiet, as_json=reply.as_json, force=reply.force)
-        table.fill("table", sources, mapping=mapped.mapping())
-        return
-    from xosc_lateral.files.atomic import write_atomically
-    from xosc_lateral.files.recognised import propose_mapping
-
-    text = propose_mapping(sources)
-    (path,) = reply.claim(sources, mapping=(output, "mapping.toml"))
-    if path is None:
-        write_stdout(text)
-    else:
-        write_atomically(path, text)
+    table.fill("table", sources, columns=mapped.mapping())

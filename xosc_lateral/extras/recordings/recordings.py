@@ -108,7 +108,7 @@ def _composed(track: RecordedTrack) -> RecordedTrack:
 def drives_of(source: Path, road: Path, columns: MappingLike | None = None) -> ImportedDrives:
     """The drives of a recording on a road."""
     kind = format_of(source)
-    return import_drives(kind, source, road=road, **({"mapping": columns} if kind == "tracks" else {}))
+    return import_drives(kind, source, road=road, **({"columns": columns} if kind == "tracks" else {}))
 
 
 def format_of(source: Path) -> str:
@@ -127,7 +127,7 @@ def format_of(source: Path) -> str:
 
 # ---- tracks on a known road, or on the recording's own lanes ---------------------------------------------------------
 def _tracks(source: Path, road: Path | None, columns: TableMapping, wanted: str | None = None) -> list[RecordedTraffic]:
-    every = read_tracks(source, mapping=columns).of_recording(wanted, source)
+    every = read_tracks(source, columns).of_recording(wanted, source)
     return [_on_road(tracks, source, road) for tracks in every]
 
 

@@ -29,6 +29,7 @@ from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.files.drives import file_label, file_labels
+from xosc_lateral.files.mapping import as_mapping
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
 from xosc_lateral.files.source import parsed_hash
@@ -91,7 +92,12 @@ def import_drives(
     FormatError
         An unknown format, or a source that can't be read.
     """
-    sources = (opened_as_one(source, options.get("mapping")),) if format == "tracks" else tuple(opened(source, "table"))
+    former = [options.pop(word) for word in ("mapping", "channels") if format in IMPORTERS and word in options]
+    if former:  # words of before, of one meaning today
+        every = [*map(as_mapping, (*former, options.get("columns")))]
+        columns = {name: one for known in every for name, one in known.columns.items()}
+        options["columns"] = replace(every[0], columns=columns)
+    sources = (opened_as_one(source, options.get("columns")),) if format == "tracks" else tuple(opened(source, "table"))
     if not sources:
         raise ValueError("no source to import")
     if options.get("road") is not None:
@@ -178,7 +184,7 @@ class ImportedDrives(Result):
         output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
         claim([output], [source for source in self.sources if source.is_file()], force=force)
         text = lambda: harmless_frame(self.table).to_csv(index=False, lineterminator="\n")  # noqa: E731
-        write_table(output, asdict(self.provenance), frame=lambda: self.table, text=text)
+        write_table(output, asdict(self.provenance), frame=self.to_frame, text=text)
         return output
 
 

@@ -18,11 +18,11 @@ from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.tables import read_table, tables_at
 
 
-def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> ImportedDrives:
+def import_table(sources: Path | Sequence[Path], *, columns: MappingLike | None = None) -> ImportedDrives:
     """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
     again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
     """
-    known, files = as_mapping(mapping), [table for path in paths_of(sources) for table in tables_at(path)]
+    known, files = as_mapping(columns), [table for path in paths_of(sources) for table in tables_at(path)]
     made, lost, drives = list[pd.DataFrame](), Counter[str](), list[Drive]()
     for path, label in zip(files, file_labels(files), strict=True):
         read = read_table(path, known)

@@ -38,7 +38,13 @@ from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of
-from xosc_lateral.extras.recordings.importers.tracks import PlacedTracks, drive_table, mostly_beside, place_on_road, require_lanes
+from xosc_lateral.extras.recordings.importers.tracks import (
+    PlacedTracks,
+    drive_table,
+    mostly_beside,
+    place_on_road,
+    require_lanes,
+)
 from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad
 from xosc_lateral.files.mapping import TableMapping, classes_of
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
@@ -211,7 +217,7 @@ def tracks_in(recording: Recording) -> Tracks:
     kinds = recording.classes(recording.meta.set_index("trackId").reindex(table["trackId"]))
     clock = table["frame"] / recording.frame_rate
     named = table.assign(time=clock, heading=np.radians(table["heading"]), vehicle_class=kinds)
-    return tracks_of(named, recording.path, (), TableMapping())
+    return tracks_of(named, recording.path, TableMapping())
 
 
 def _in_lanes(

@@ -38,7 +38,6 @@ from xosc_lateral.files.mapping import (
     MappingLike,
     TableMapping,
     as_mapping,
-    parse_map,
     standard_sources,
 )
 from xosc_lateral.files.output_tables import RECOGNISED_BY
@@ -71,16 +70,7 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     "length": ("length", "vehicle_length", "dimension_length", "v_length"),
     "width": ("width", "vehicle_width", "dimension_width", "v_width"),
     "rear": ("rear",),
-    "vehicle_class": (
-        "vehicle_class",
-        "class",
-        "type",
-        "agent_type",
-        "object_type",
-        "vehicle_type",
-        "object_category",
-        "v_class",
-    ),
+    "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type", "vehicle_type", "object_category"),
 }
 """Name -> headers that are understood, as `plain_header` has them, the first that is there; others by the map."""
 
@@ -150,25 +140,23 @@ def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray)
     return np.arctan2(vy, vx), np.hypot(vx, vy)
 
 
-def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
+def read_tracks(path: Path, columns: MappingLike | None = None) -> Tracks:
     """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
-    saved = as_mapping(mapping)
+    saved = as_mapping(columns)
     if path.is_dir():
-        return tracks_of(read_table(path, saved), path, columns, saved)
+        return tracks_of(read_table(path, saved), path, saved)
     with open_source(path) as source:
         is_log = unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
     # no name holds the table: it goes as soon as its columns are taken
-    return tracks_of(read_esmini_log(path) if is_log else read_table(path, saved), path, columns, saved, is_log=is_log)
+    return tracks_of(read_esmini_log(path) if is_log else read_table(path, saved), path, saved, is_log=is_log)
 
 
-def tracks_of(
-    table: pd.DataFrame, path: Path, columns: Sequence[str], saved: TableMapping, *, is_log: bool = False
-) -> Tracks:
+def tracks_of(table: pd.DataFrame, path: Path, saved: TableMapping, *, is_log: bool = False) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
     is_played = set(map(str, table.columns)) >= set(RECOGNISED_BY)
     if is_played:  # its positions are those of reference points
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
-    rows, lost = _columns(table, path, saved, columns)
+    rows, lost = _columns(table, path, saved)
     del table
     codes, labels = rows.pop("vehicle").factorize(sort=True)
     time = rows.pop("time").to_numpy()
@@ -276,11 +264,9 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path, *, counts:
     raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
-def _columns(
-    table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]
-) -> tuple[pd.DataFrame, dict[str, int]]:
+def _columns(table: pd.DataFrame, path: Path, saved: TableMapping) -> tuple[pd.DataFrame, dict[str, int]]:
     """Columns under their names, and the rows that are not in them by reason."""
-    mapping = {**saved.columns, **parse_map(words)}
+    mapping = dict(saved.columns)
     if "class" in mapping:
         mapping["vehicle_class"] = mapping.pop("class")
     if unknown := mapping.keys() - HEADERS.keys():

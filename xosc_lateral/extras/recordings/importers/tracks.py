@@ -36,7 +36,7 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, i
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, read_tracks
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.workflows.options import MAPPING, flag
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.surroundings.lane_order import LaneGraph, RoadLanes, neighbour_columns
 
@@ -70,9 +70,7 @@ class PlacedTracks:
 def import_tracks(
     source: Path, *,
     road: Annotated[Path | str, flag("--road", kind=Path, metavar="FILE.xodr", help="Road on which the tracks lie.")],
-    columns: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=COLUMN[:UNIT]",
-        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
-    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    columns: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
 ) -> ImportedDrives:  # fmt: skip
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
@@ -81,7 +79,7 @@ def import_tracks(
     middle, or lie `rear` behind it, in the road's coordinates.
     """
     network = read_opendrive(road)
-    placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
+    placed, graph = place_on_road(read_tracks(source, columns), network)
     require_lanes(placed, Path(road).name, source)
     sources, far = [source, Path(road)], mostly_beside(placed)
     return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE, notes=far)
