@@ -71,39 +71,46 @@ def inputs_of(paths: Iterable[PathLike]) -> list[Path]:
 @contextmanager
 def sent_back(*outputs: PathLike | None) -> Iterator[list[Any]]:
     """Where to write outputs: of those elsewhere, copies of what is there; what changed goes back, however it ends."""
-    here, folders = list[Any](), list[Path]()
-    for output in outputs:
-        if output is None or not is_url(output):
-            here.append(output)
-            continue
-        url = address(output)
-        with _storage(url) as (files, place):
-            _copies(files, [place], url)
-        here.append(f"{_place(url)}{'/' * url.endswith('/')}")
-        path = _place(url)
-        folders.append(path if path.is_dir() or url.endswith("/") or not path.suffix else path.parent)
+    here: list[Any] = [None if output is None else brought(output) for output in outputs]
     try:
         yield here
     finally:
-        for folder in folders:
-            _send_back(folder)
+        for output, place in zip(outputs, here, strict=True):
+            if output is not None and is_url(output):
+                path = Path(place)
+                is_folder = path.is_dir() or str(place).endswith("/") or not path.suffix
+                _send_back(path if is_folder else path.parent)
+
+
+def brought(output: PathLike) -> PathLike:
+    """Where to write an output: itself, or, of one elsewhere, a copy of what is there; see `send`."""
+    if not is_url(output):
+        return output
+    url = address(output)
+    with _storage(url) as (files, place):
+        _copies(files, [place], url)
+    return f"{_place(url)}{'/' * url.endswith('/')}"
 
 
 def _send_back(folder: Path) -> None:
     """Take what was written to a copy of a folder there, and remove there what is gone."""
     known = {file for file in _BROUGHT if folder in file.parents}
     for file in sorted(known | {file for file in folder.rglob("*") if file.is_file()}):
-        state = file_state(file)
-        if state == _BROUGHT.get(file):
-            continue
-        with _storage(address(file)) as (files, place):
-            if state:
-                files.makedirs(files._parent(place), exist_ok=True)
-                files.put_file(str(file), place)
-                _BROUGHT[file] = state
-            else:
-                files.rm_file(place)
-                del _BROUGHT[file]
+        send(file)
+
+
+def send(file: Path) -> None:
+    """A file where it belongs, if this is a copy of one elsewhere that has changed, or is gone."""
+    if not (url := address(file)) or (state := file_state(file)) == _BROUGHT.get(file):
+        return
+    with _storage(url) as (files, place):
+        if state:
+            files.makedirs(files._parent(place), exist_ok=True)
+            files.put_file(str(file), place)
+            _BROUGHT[file] = state
+        else:
+            files.rm_file(place)
+            del _BROUGHT[file]
 
 
 def _files_of(path: PathLike, *, is_pattern: bool) -> list[Path]:
