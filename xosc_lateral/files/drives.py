@@ -87,9 +87,9 @@ def read_drives(
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
     names = Counter(drive.name for drive in drives)
-    homes = [drive.source.removesuffix(".feather") for drive in drives]  # which frames are held as
-    both = zip(drives, homes, strict=True)
-    apart = [drive.name if names[drive.name] == 1 else f"{home}:{drive.name}" for drive, home in both]
+    tables = [*dict.fromkeys(Path(drive.source) for drive in drives)]
+    home = dict(zip(tables, file_labels(tables), strict=True))
+    apart = [one.name if names[one.name] == 1 else f"{home[Path(one.source)]}:{one.name}" for one in drives]
     seen, again = Counter[str](), Counter(apart)
     for k, name in enumerate(apart):
         seen[name] += 1

@@ -73,8 +73,19 @@ class Result(Telling, ABC):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance, whole or not at all."""
-        inputs = getattr(self, "files", ())
-        return write_table(path, self.usual_table, self.to_frame, self._provenance, inputs=inputs, force=force)
+        from xosc_lateral.files.output_paths import claim, output_file
+        from xosc_lateral.files.output_tables import output_suffixes, write_table
+
+        output = output_file(path, self.usual_table, output_suffixes())
+        claim([output], getattr(self, "files", ()), force=force)
+        write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
+        return output
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.files.output_tables import csv_text
+
+        return csv_text(self.to_frame())
 
     def _provenance(self) -> Mapping[str, Any]:
         """What it was made from."""
@@ -121,25 +132,6 @@ def write_page(
     output = output_file(path, usual_name, PAGE_SUFFIXES)
     claim([output], inputs, force=force)
     return write_atomically(output, html())
-
-
-def write_table(
-    path: PathLike,
-    usual_name: str,
-    frame: Callable[[], pd.DataFrame],
-    provenance: Callable[[], Mapping[str, Any]],
-    *,
-    inputs: Iterable[Path] = (),
-    force: bool = False,
-) -> Path:
-    """Write a table with its provenance beside it, if need be into a folder; made only if it may be written there."""
-    from xosc_lateral.files.output_paths import claim, output_file
-    from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-    output = output_file(path, usual_name, output_suffixes())
-    claim([output], inputs, force=force)
-    write_frame(frame(), output, provenance())
-    return output
 
 
 __all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]

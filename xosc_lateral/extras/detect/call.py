@@ -79,6 +79,8 @@ def detect(
     seed: int = 0,
     road: Annotated[RoadLike | None, flag("--road", kind=Path | None, show_default=False,
         help="OpenDRIVE file of a recording without one.")] = None,
+    format: Annotated[str | None, flag("--format", metavar="FORMAT", show_default=False,  # noqa: A002
+        help="Of recordings, where their files do not show it: dlr-ht, levelx, osi, tracks ...")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     allow: Paths = (),
@@ -148,7 +150,7 @@ def detect(
     for word in requested:  # before anything is read that takes long
         _read_detector(word, threshold, answer_time)
     convert = ConvertSettings.of(seed=seed, library=library, allow=allow, road_path=road_path, time_limit=time_limit)
-    settings = SourceSettings(convert, variants, names, ego, columns=as_mapping(columns))
+    settings = SourceSettings(convert, variants, names, ego, columns=as_mapping(columns), kind=format)
     if isinstance(road, str | os.PathLike):
         settings = settings.on(Path(road))
     if like is not None:

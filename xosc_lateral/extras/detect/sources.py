@@ -66,6 +66,7 @@ class SourceSettings:
     road: Path | None = None
     columns: TableMapping = field(default_factory=lambda: as_mapping(None))
     held: Held | None = None  # a scenario in memory
+    kind: str | None = None  # format of a recording; None: as its file shows
 
     def on(self, road: Path | None, held: Held | None = None) -> SourceSettings:
         """The same, with a road that counts whatever a scenario says."""
@@ -117,7 +118,9 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
-    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and format_of(path) == "tracks"
+    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and (
+        settings.kind or format_of(path)
+    ) == "tracks"
     told_lines = dict[str, None]()
     if is_table and settings.road is None:
         read = partial(_driven, path, settings, told_lines)
@@ -185,7 +188,7 @@ def _driven(path: Path, settings: SourceSettings, told_lines: dict[str, None]) -
 
 def _recorded(path: Path, settings: SourceSettings, told_lines: dict[str, None]) -> Iterator[Scene]:
     """Tracks of several vehicles, a scene for each recording."""
-    for traffic in read_recordings(path, road=settings.road, columns=settings.columns):
+    for traffic in read_recordings(path, kind=settings.kind, road=settings.road, columns=settings.columns):
         told_lines |= dict.fromkeys(traffic.notes)
         yield _scene_of(traffic, path, settings)
 

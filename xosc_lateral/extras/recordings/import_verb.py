@@ -27,13 +27,12 @@ class _Table(Written):
     def fill(self, name: str, sources: Path | Sequence[Path], **options: Any) -> None:
         """Read recordings of a format, write them as a table, and say what they are."""
         from xosc_lateral import import_drives
-        from xosc_lateral.files.output_tables import harmless_frame
 
         files = [sources] if isinstance(sources, Path) else sources
         (table,) = self.claim(files, table=(self.output, "drives.parquet"))
         imported = import_drives(name, sources, **options)
         if table is None:
-            write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
+            write_stdout(imported.csv())
             self.say_words(str(imported), None)
         else:
             written = imported.write(self.output, force=self.force)

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.texts import composed
-from xosc_lateral.drivers.drives.evidence import of_registration
-from xosc_lateral.extras.recordings.cuts import require_along_lanes
+from xosc_lateral.extras.recordings.cuts import require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
-from xosc_lateral.extras.recordings.importers.tracks import LaneShape
+from xosc_lateral.extras.recordings.importers.tracks import LaneShape, place_on_road
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
 from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
@@ -136,10 +135,8 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     from xosc_lateral.extras.recordings.osi_trace import read_osi
 
     recorded = read_osi(source)
-    made = recorded.opendrive
-    if road is None and made is None and (lanes := lanes_of(recorded)) is not None:
-        made = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
-    traffic = _on_road(recorded.tracks, source, road, made)
+    lanes = lanes_of(recorded) if road is None and recorded.opendrive is None else None
+    traffic = _on_road(recorded.tracks, source, road, recorded.opendrive, lanes=lanes)
     host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
     return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
@@ -149,8 +146,7 @@ def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> Recor
 
     tracks, shapes, graph, _ = read_obstacles(source, source.stem)
     names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
-    made = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
-    return _on_road(replace(tracks, names=names), source, road, made)
+    return _on_road(replace(tracks, names=names), source, road, lanes=(shapes, graph))
 
 
 def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -174,8 +170,13 @@ def name_of(source: Path) -> str:
     return source.name.split(".")[0]
 
 
-def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
-    """`made`: OpenDRIVE of the recording's own lanes, for where no road is given."""
+def _on_road(
+    tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None, *,
+    lanes: tuple[Sequence[LaneShape], LaneGraph] | None = None,
+) -> RecordedTraffic:  # fmt: skip
+    """`made`: OpenDRIVE of the recording's own lanes, or these, for where no road is given."""
+    if made is None and road is None and lanes is not None:
+        made = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
     if road is not None:
         network, data, road_name = read_opendrive(road), read_source(road).data, road.name
     elif made is not None:
@@ -184,9 +185,8 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
-    every = slice(None, None, max(1, len(x) // GATE_ROWS))
-    place = require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    shift = of_registration(*place, tracks.vehicle[every], heading[every])
+    placed, _ = place_on_road(tracks.rows(np.arange(0, len(x), max(1, len(x) // GATE_ROWS))), network)
+    require_lane_direction(placed.agreement, placed.tracks.speed, Path(network.path).name or "its lanes", source)
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
     label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""
@@ -197,7 +197,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
         data,
         road_name,
         sources,
-        (*tracks.notes, *notes, *([shift] if shift else [])),
+        (*placed.notes(), *notes),
         host=None,
         label=label,
         dropped=tracks.dropped,

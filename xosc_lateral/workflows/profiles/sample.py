@@ -201,12 +201,6 @@ class Offsets(Result):
             panel.title, panel.x.label, panel.y.label = drive.drive, "time [s]", "offset [m]"
         return figure
 
-    def csv(self) -> str:
-        """The table as text."""
-        from xosc_lateral.files.output_tables import csv_text
-
-        return csv_text(self.to_frame())
-
     @property
     def usual_table(self) -> str:
         """Called after the profile."""

@@ -30,13 +30,12 @@ from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.files.drives import file_label, file_labels
 from xosc_lateral.files.mapping import as_mapping
-from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
+from xosc_lateral.files.output_tables import harmless_frame
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.opened import opened, opened_as_one
 from xosc_lateral.workflows.options import declare_options
-from xosc_lateral.workflows.result import PathLike, Paths, Result
+from xosc_lateral.workflows.result import Paths, Result
 
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
@@ -179,13 +178,22 @@ class ImportedDrives(Result):
         """Plain values, as ``--json`` prints them: the provenance."""
         return asdict(self.provenance) | {"messages": self.message_records()}
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance, whole or not at all."""
-        output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
-        claim([output], [source for source in self.sources if source.is_file()], force=force)
-        text = lambda: harmless_frame(self.table).to_csv(index=False, lineterminator="\n")  # noqa: E731
-        write_table(output, asdict(self.provenance), frame=self.to_frame, text=text)
-        return output
+    def csv(self) -> str:
+        """The table as text, every digit of it."""
+        return str(harmless_frame(self.table).to_csv(index=False, lineterminator="\n"))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """That were read."""
+        return tuple(source for source in self.sources if source.is_file())
+
+    @property
+    def usual_table(self) -> str:
+        """Called after the first source."""
+        return f"{file_label(self.sources[0])}.parquet"
+
+    def _provenance(self) -> dict[str, Any]:
+        return asdict(self.provenance)
 
 
 # ---- what importers make ---------------------------------------------------------------------------------------------

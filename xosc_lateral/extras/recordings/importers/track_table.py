@@ -119,13 +119,15 @@ class Tracks:
             mine = np.flatnonzero(self.recording == number)
             if len(mine) and wanted in (None, label):
                 numbers, vehicle = np.unique(self.vehicle[mine], return_inverse=True)
-                arrays: dict[str, Any] = {
-                    name: values[mine] for name, values in vars(self).items()
-                    if isinstance(values, np.ndarray) and name not in ("vehicle", "recording")
-                }  # fmt: skip
                 names = tuple(self.names[k] for k in numbers.tolist())
-                made.append(replace(self, names=names, vehicle=vehicle, recording=None, recordings=(label,), **arrays))
+                alone = self.rows(mine)
+                made.append(replace(alone, names=names, vehicle=vehicle, recording=None, recordings=(label,)))
         return made
+
+    def rows(self, rows: IntArray) -> Tracks:
+        """Some rows, of vehicles of the same numbers."""
+        arrays: dict[str, Any] = {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+        return replace(self, **{name: values[rows] for name, values in arrays.items()})
 
 
 USUAL_SPEEDS = 5.0, 60.0  # of moving traffic in the median, towns to motorways [m/s]
