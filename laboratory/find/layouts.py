@@ -30,6 +30,7 @@ class Layout:
     file: str = "bent.csv"
     format: str = "tracks"
     has_length: bool = True
+    blur: float = 0.0  # of the offset [m]
 
 
 def numbered(rows: Rows) -> Rows:
@@ -118,6 +119,7 @@ LAYOUTS = {
         {"x": "Global_X:ft", "y": "Global_Y:ft", "length": "v_Length:ft", "width": "v_Width:ft",
          "speed": "v_Vel:ft/s"},
         reference="front",
+        blur=0.005,  # no headings: those of the way, which is the front's in bends
     ),
     "Argoverse 2": Layout(argoverse, {"time": "timestep:1/25 s"}, file="bent.parquet", has_length=False),
     "Waymo": Layout(waymo, lines=("[values.vehicle_class]", '"TYPE_VEHICLE" = "car"')),

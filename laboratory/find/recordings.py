@@ -388,6 +388,7 @@ def differs(table: Rows, truth: Rows, spec: Spec, bend: Bend) -> str:
         return "time"
     true = truth.iloc[np.clip(at, 0, len(truth) - 1)]
     blur = bend.blur * spec["size"] + (0.02 if spec["layout"] == "osi" else 0.0)
+    blur += LAYOUTS[spec["public"]].blur if spec["public"] else 0.0
     for name, tolerance in TOLERANCES.items():
         if name in table and np.nanmax(np.abs(table[name].to_numpy() - true[name].to_numpy())) > tolerance + (
             blur if name == "offset" else 0.0

@@ -197,8 +197,9 @@ def require_evidence(
         wrong = wrong or (None if "offset" in named else evidence.of_places(offset, width))
         if wrong:
             raise FormatError(wrong, path=path, element="column 'offset'")
-    if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
-        raise FormatError(wrong, path=path, element="column 'time'")
+        in_metres = farthest <= median and LANE_WIDTHS[0] <= median <= LANE_WIDTHS[1]  # else that is said
+        if wrong := evidence.of_wander(np.concatenate(wander)) if in_metres and "time" not in named else None:
+            raise FormatError(wrong, path=path, element="column 'time'")
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
