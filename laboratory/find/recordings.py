@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from laboratory.find import layouts
 from laboratory.find.engine import Finding, Spec
-from laboratory.find.layouts import LAYOUTS
 from tests.kit import recordings as kit
+from tests.kit.generated import layouts
+from tests.kit.generated.layouts import LAYOUTS
 from xosc_lateral import Drive, read_drives
 from xosc_lateral.cli import main as command
 

@@ -28,6 +28,9 @@ PathLike = str | Path
 _BROUGHT: dict[Path, str] = {}
 """Copies as they came from elsewhere, or went there, and their `file_state`."""
 
+_AT_ONCE: set[Path] = set()
+"""Folders of copies from which files go back as soon as they are written; of a batch, when it ends."""
+
 _ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+):/+(.+)", re.IGNORECASE)
 """A scheme has two letters at least (``C:/`` is a drive); of ``//``, a `Path` leaves one."""
 
@@ -71,19 +74,24 @@ def inputs_of(paths: Iterable[PathLike]) -> list[Path]:
 @contextmanager
 def sent_back(*outputs: PathLike | None) -> Iterator[list[Any]]:
     """Where to write outputs: of those elsewhere, copies of what is there; what changed goes back, however it ends."""
-    here: list[Any] = [None if output is None else brought(output) for output in outputs]
+    here: list[Any] = [None if output is None else _brought(output) for output in outputs]
     try:
         yield here
     finally:
         for output, place in zip(outputs, here, strict=True):
             if output is not None and is_url(output):
-                path = Path(place)
-                is_folder = path.is_dir() or str(place).endswith("/") or not path.suffix
-                _send_back(path if is_folder else path.parent)
+                _send_back(_folder_of(place))
 
 
 def brought(output: PathLike) -> PathLike:
-    """Where to write an output: itself, or, of one elsewhere, a copy of what is there; see `send`."""
+    """Where to write an output: itself, or, of one elsewhere, a copy of what is there, which is sent when written."""
+    place = _brought(output)
+    if is_url(output):
+        _AT_ONCE.add(_folder_of(place))
+    return place
+
+
+def _brought(output: PathLike) -> PathLike:
     if not is_url(output):
         return output
     url = address(output)
@@ -92,18 +100,28 @@ def brought(output: PathLike) -> PathLike:
     return f"{_place(url)}{'/' * url.endswith('/')}"
 
 
+def _folder_of(place: PathLike) -> Path:
+    path = Path(place)
+    return path if path.is_dir() or str(place).endswith("/") or not path.suffix else path.parent
+
+
 def _send_back(folder: Path) -> None:
     """Take what was written to a copy of a folder there, and remove there what is gone."""
     known = {file for file in _BROUGHT if folder in file.parents}
     for file in sorted(known | {file for file in folder.rglob("*") if file.is_file()}):
-        send(file)
+        _send(file)
 
 
 def send(file: Path) -> None:
-    """A file where it belongs, if this is a copy of one elsewhere that has changed, or is gone."""
-    if not (url := address(file)) or (state := file_state(file)) == _BROUGHT.get(file):
+    """A file that was written where it belongs, if this is a copy of one elsewhere."""
+    if _AT_ONCE and _AT_ONCE & {*file.parents}:
+        _send(file)
+
+
+def _send(file: Path) -> None:
+    if (state := file_state(file)) == _BROUGHT.get(file):
         return
-    with _storage(url) as (files, place):
+    with _storage(address(file)) as (files, place):
         if state:
             files.makedirs(files._parent(place), exist_ok=True)
             files.put_file(str(file), place)

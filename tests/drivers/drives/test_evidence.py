@@ -126,3 +126,18 @@ def test_drives_to_one_side_and_noise_are_named() -> None:
     assert evidence.of_drives(drives, widths) == []
     assert "to the left" in evidence.of_drives([one + 0.8 for one in drives], widths)[0]
     assert "err by 0.3" in evidence.of_drives([one + 0.3 * rng.normal(size=600) for one in drives], widths)[0]
+
+
+def test_a_number_that_stands_for_no_value_is_told_where_it_comes_again_and_again() -> None:
+    rng = np.random.default_rng(3)
+    offset = 0.3 * np.sin(np.arange(3000) / 80.0) + 0.005 * rng.normal(size=3000)
+    rounded = np.round(offset, 1)  # a coarse sensor repeats itself, too
+    assert evidence.of_marker(offset) is evidence.of_marker(rounded) is None
+    for value in (-1.0, 0.0):
+        gone = np.where(np.arange(3000) % 700 < 40, value, offset)
+        assert f"missing = [{value:g}]" in (evidence.of_marker(gone) or ""), value
+
+
+def test_sizes_in_feet_are_told_by_the_width() -> None:
+    long, wide = np.full(9, 4.6), np.full(9, 1.8)
+    assert "length=COLUMN:ft, width=COLUMN:ft" in (evidence.of_sizes(long / 0.3048, wide / 0.3048) or "")
