@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Options, Written, command, pairs, with_options, write_stdout
+from xosc_lateral.cli.words import Options, Written, command, pairs, with_options, write_stdout
 from xosc_lateral.extras.recordings.importers import GROUP, IMPORTERS, find_importer
 
 
@@ -37,15 +37,6 @@ class _Table(Written):
         else:
             written = imported.write(self.output, force=self.force)
             self.say_words(str(imported), {"output": str(written), **imported.to_dict()})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _CutTable(_Table):
-    """The same of formats from which lane changes and the like are cut."""
-
-    keep_cut: Annotated[
-        bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
-    ] = False
 
 
 class _WithPlugins(TyperGroup):
@@ -94,12 +85,12 @@ def _add(
             from xosc_lateral.extras.recordings.importers.mf4 import channels_wanted
 
             raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-        table.fill(name, sources, **options, **({"keep_cut": table.keep_cut} if isinstance(table, _CutTable) else {}))
+        table.fill(name, sources, **options)
 
     run.__doc__ = str(importer.__doc__).partition("\n\n")[0]
     argument = typer.Argument(metavar=metavar, help=sources, show_default=False)
-    run.__annotations__ = {"sources": Annotated[kind, argument], "options": Annotated[Options, importer]}
-    run.__annotations__["table"] = _Table if name in ("mf4", "fcd") else _CutTable
+    annotations = {"sources": Annotated[kind, argument], "options": Annotated[Options, importer], "table": _Table}
+    run.__annotations__ = annotations
     command(group, name, short, *examples)(run)
 
 
@@ -133,17 +124,8 @@ _add(
     "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv",
     sources="Traces (.mcap, .osi).", metavar="TRACE...",
 )
-
-
-@command(
-    group, "table", "Tables of drives under other names.",
+_add(
+    "table", "Tables of drives under other names.",
     "import table *.csv --mapping company.toml -o drives.parquet",
+    sources="Tables of drives.", metavar="TABLE...",
 )
-def table_(
-    sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
-    *,
-    mapped: Mapped,
-    table: _Table,
-) -> None:
-    """Tables of drives under a company's own names, units and words, by a saved mapping."""
-    table.fill("table", sources, columns=mapped.mapping())

@@ -34,7 +34,7 @@ from xosc_lateral.files.output_tables import harmless_frame
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.opened import opened, opened_as_one
-from xosc_lateral.workflows.options import declare_options
+from xosc_lateral.workflows.options import declare_options, flag
 from xosc_lateral.workflows.result import Paths, Result
 
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
@@ -116,7 +116,7 @@ def _known_options(read: Callable[..., object], format: str, options: Mapping[st
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
         return dict(options)
     kinds, known_values = {parameter.name: parameter.annotation for parameter in known}, {}
-    kinds |= {"keep_cut": bool} if getattr(read, "can_keep_cut", False) else {}
+    kinds |= {"keep_cut": bool} if "keep_cut" in getattr(read, "__options__", {}) else {}
     for name, value in options.items():
         if name not in kinds:
             raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
@@ -243,6 +243,10 @@ def import_each(files: Sequence[Path], read: Callable[[Path, str], ImportedDrive
     return ImportedDrives(pd.concat([part.table for part in parts], ignore_index=True), record)
 
 
+KEEP_CUT = flag("--keep-cut", kind=bool | None,
+    help="Keep rows that would be cut; the column `state` gives the reason.")  # fmt: skip
+
+
 def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrives]:
     """Options that annotations declare; without the rows that are cut, unless they are kept (`keep_cut`).
 
@@ -267,7 +271,7 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
             _refuse_nonsense(kept, path)
         return ImportedDrives(kept, record)
 
-    within.can_keep_cut = True  # type: ignore[attr-defined]
+    within.__options__["keep_cut"] = KEEP_CUT  # type: ignore[attr-defined]
     return within
 
 

@@ -16,10 +16,14 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, p
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
 from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.tables import read_table, tables_at
+from xosc_lateral.workflows.options import declare_options
 
 
+@declare_options
 def import_table(sources: Path | Sequence[Path], *, columns: MappingLike | None = None) -> ImportedDrives:
-    """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
+    """Tables of drives under a company's own names, units and words, by a saved mapping.
+
+    A drive is called after its file, its label and how often its clock began
     again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
     """
     known, files = as_mapping(columns), [table for path in paths_of(sources) for table in tables_at(path)]
