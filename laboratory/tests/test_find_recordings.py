@@ -8,15 +8,13 @@ from laboratory.find.drivers import Drivers
 from laboratory.find.engine import find, kind_of, shrink, spec_of
 from laboratory.find.recordings import Recordings
 
-KNOWN = {"from the left marking"}
-"""Bends that are read wrongly in silence: an offset that counts from the left marking."""
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
-def test_nothing_but_what_is_known_is_read_wrongly_in_silence() -> None:
+def test_nothing_is_read_wrongly_in_silence() -> None:
     machine = Recordings()
     found = [one for seed in range(500, 560) for one in machine.look(spec_of(machine, seed))]
-    assert {one["stage"] for one in found if not one["said"]} <= KNOWN
+    assert not [one for one in found if not one["said"]]
     spec = spec_of(machine, 501)
     assert spec == spec_of(machine, 501) and machine.look(spec) == machine.look(spec)
 

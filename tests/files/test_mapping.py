@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,8 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
 from xosc_lateral.files.drives import read_drives
 from xosc_lateral.files.mapping import as_mapping, read_mapping
+from xosc_lateral.files.recognised import recognised
+from xosc_lateral.files.tables import read_table
 
 MAPPING = """
 encoding = "cp1252"
@@ -131,7 +132,7 @@ def test_from_raw_files_to_a_tagged_library_in_five_commands(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names = [_company(tmp_path, f"fahrt{k}.csv", k).name for k in range(2)]
-    assert main(["import", "table", "--propose", *names, "-o", "company.toml"]) == 0
+    assert main(["check", *names, "--write-mapping", "company.toml"]) == 0
     proposed = Path("company.toml").read_text(encoding="utf-8")
     assert 'encoding = "cp1252"' in proposed and "CHECK" in proposed
     assert 'LKW" = 1' in proposed and 'PKW" = 0' in proposed
@@ -180,10 +181,7 @@ HEADERS_IN_USE = {
 
 @pytest.mark.parametrize(("name", "header"), [(name, one) for name, every in HEADERS_IN_USE.items() for one in every])
 def test_headers_of_the_usual_systems_are_proposed(name: str | None, header: str, tmp_path: Path) -> None:
-    from xosc_lateral.files.recognised import propose_mapping
-
     path = tmp_path / "t.csv"
     path.write_text(f"time,{header}\n" + "".join(f"{0.1 * k},{1.7 + 0.01 * k}\n" for k in range(50)))
-    columns = tomllib.loads(propose_mapping([path]))["columns"]
-    found = {key for key, value in columns.items() if key != "time"}
-    assert found == ({name} if name else set()), columns
+    columns, _ = recognised([read_table(path, as_mapping(None))], path)
+    assert {one.name for one in columns} - {"time"} == ({name} if name else set()), columns

@@ -131,11 +131,26 @@ FORMS = {
     "frame": pd.read_csv,
     "dict": lambda path: pd.read_csv(path).to_dict("list"),
     "Arrow": lambda path: pa.table(dict(pd.read_csv(path))),
+    "polars": lambda path: Foreign(pa.table(dict(pd.read_csv(path)))),
     "Drive": lambda path: xl.read_drives(path)[0],
     "Drives": lambda path: xl.read_drives(path),
     "result": lambda path: xl.import_drives("table", path),
 }
 """What stands for drives, made of the path of their table."""
+
+
+class Foreign:
+    """A lazy frame as polars has them: it is collected, and gives Arrow's stream."""
+
+    def __init__(self, table: pa.Table) -> None:
+        self.table = table
+
+    def collect(self) -> Foreign:
+        return self
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        return self.table.__arrow_c_stream__(requested_schema)
+
 
 VERBS = {
     "read_drives": lambda drives, coarse: xl.read_drives(drives),
@@ -143,6 +158,8 @@ VERBS = {
     "sample": lambda drives, coarse: xl.sample(coarse, like=drives),
     "evaluate": lambda drives, coarse: xl.evaluate(coarse, drives, classify=False),
     "detect": lambda drives, coarse: xl.detect(drives, detectors="lateral-speed").tallies,
+    "fit": lambda drives, coarse: xl.fit(drives, model="two-level"),
+    "plan_loop": lambda drives, coarse: xl.plan_loop(drives),
     "import": lambda drives, coarse: xl.import_drives("table", drives),
 }
 

@@ -25,7 +25,7 @@ GONE = {
     "--entity": "-p NAME=PROFILE", "--road-path": "--road FOLDER", "--cluster": "--jobs ADDRESS",
     "--player-library": "--player LIBRARY", "--job-timeout": "--job-limit 600s", "--job-memory": "--job-limit 4000MB",
     "--log-json": "--json --verbose", "--for": "--player", "--resample": "--attempts", "--only": "--enrich",
-    "--train": "--home",
+    "--train": "--home", "--propose": "check TABLE... --write-mapping MAPPING.toml",
     "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
     "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
 }  # fmt: skip

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_type_hi
 
 import typer
 
-from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.errors import XoscLateralError, by_owner
 from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.plugins import offered
 from xosc_lateral.workflows.options import MAPPING, SHARED, Option, options_of, texts
@@ -100,7 +100,7 @@ def naming_option(option: str) -> Iterator[None]:
 
 def say(text: object, *, err: bool = False) -> None:
     """Lines on standard output or standard error: names that others gave do not steer the terminal."""
-    typer.echo(in_terminal(str(text)), err=err)
+    typer.echo(in_terminal(by_owner(str(text))), err=err)
 
 
 def say_json(values: Any) -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.files.remote import send
 from xosc_lateral.files.source import LOG, refuse_guarded
 
 _RUN: ContextVar[str] = ContextVar("run", default="")
@@ -118,6 +119,7 @@ def _move(staged: Staged) -> None:
         for path, temporary in staged.items():
             with _naming(path):
                 temporary.replace(path)
+            send(path)
             LOG.info("wrote %s", path)
     except BaseException:
         for path, temporary in staged.items():

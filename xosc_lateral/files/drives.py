@@ -87,9 +87,9 @@ def read_drives(
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well, of one table's by number."""
     names = Counter(drive.name for drive in drives)
-    homes = [drive.source.removesuffix(".feather") for drive in drives]  # which frames are held as
-    both = zip(drives, homes, strict=True)
-    apart = [drive.name if names[drive.name] == 1 else f"{home}:{drive.name}" for drive, home in both]
+    tables = [*dict.fromkeys(Path(drive.source) for drive in drives)]
+    home = dict(zip(tables, file_labels(tables), strict=True))
+    apart = [one.name if names[one.name] == 1 else f"{home[Path(one.source)]}:{one.name}" for one in drives]
     seen, again = Counter[str](), Counter(apart)
     for k, name in enumerate(apart):
         seen[name] += 1
@@ -100,11 +100,16 @@ def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
 
 
 def drives_of_table(
-    table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame", lost: Counter[str] | None = None
-) -> list[Drive]:
+    table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame", lost: Counter[str] | None = None,
+    *, is_translated: bool = False,
+) -> list[Drive]:  # fmt: skip
     """Drives of a table that is in memory; `path` is what messages call it. Else see `read_drives`."""
+    known, lost = as_mapping(mapping), Counter[str]() if lost is None else lost
     try:
-        return _drives_of(frame_of(table), as_mapping(mapping), Path(path), Counter() if lost is None else lost)
+        if not is_translated:
+            read, table = len(table), translated(frame_of(table), known, Path(path))
+            lost["not chosen"] += read - len(table)
+        return _drives_of(table, known, Path(path), lost)
     except FormatError as error:
         message = f"{error.element or ''} {error.what}"
         if ("column" not in message and "--map" not in message) or not Path(path).suffix:
@@ -114,8 +119,6 @@ def drives_of_table(
 
 
 def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Counter[str]) -> list[Drive]:
-    read, table = len(table), translated(table, mapping, path)
-    lost["not chosen"] += read - len(table)
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns: dict[str, FloatArray] = {}
@@ -126,13 +129,14 @@ def _drives_of(table: pd.DataFrame, mapping: TableMapping, path: Path, lost: Cou
         what = f"no column 'time'; there are {listed(columns)} (translate with {advice})"
         raise FormatError(what, path=path, line=1)
     if not ({"offset", "lane_width"} <= columns.keys() or {"distance_left", "distance_right"} <= columns.keys()):
-        needed = "needs distance_left and distance_right, or offset and lane_width"
+        needed = "needs distance_left and distance_right, or lane_width and one of these or offset"
         what = f"{needed}; there are {listed(columns)} (translate with --map NAME=COLUMN)"
         what += "; x and y are in lanes with a road: fit --road, import tracks" if {"x", "y"} <= columns.keys() else ""
         raise FormatError(what, path=path, line=1)
     levels = frozenset(name for name, values in columns.items() if _holds_levels(name, values))
     every = list(rows_of_drives(table, path))
-    require_evidence(columns, every, path, {name for name, source in mapping.columns.items() if source.unit})
+    named = {name for name, source in mapping.columns.items() if source.unit}
+    require_evidence(columns, every, path, named | ({"missing"} if mapping.missing is not None else set()))
     drives = []
     for name, rows in every:
         drive = clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path, lost)
@@ -154,10 +158,10 @@ def require_evidence(
 ) -> None:  # fmt: skip
     """Refuse drives whose rows contradict their clock, each other, or the unit and side of their offset.
 
-    `named`: columns whose unit a mapping states.
+    `named`: columns whose unit a mapping states, and "missing", if it states what stands for no value.
     """
     offset, width = position(columns)
-    jumps, steps, wander = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+    wander, jumps = [np.zeros(0)], [(np.zeros(0),) * 3]
     for name, rows in drives:
         mine = rows[np.isfinite(columns["time"][rows])]
         mine = mine[np.argsort(columns["time"][mine], kind="stable")]
@@ -171,8 +175,9 @@ def require_evidence(
             what = f"rows of {count} vehicles or drives in turns; which is whose, drive=COLUMN says"
             raise FormatError(f"drive {name}: {what}", path=path, element="column 'offset'")
         lane = columns["lane_index"][mine] if "lane_index" in columns else None
-        for all_of, seen in zip((jumps, steps), evidence.jumps_of(time, offset[mine], width[mine], lane), strict=True):
-            all_of.append(seen)
+        if "missing" not in named and (wrong := evidence.of_marker(offset[mine])):
+            raise FormatError(f"drive {name}: {wrong}", path=path, element="column 'offset'")
+        jumps.append(evidence.jumps_of(time, offset[mine], width[mine], lane))
     speed, most = columns.get("speed", np.zeros(0)), MAX_MEDIAN_SPEED * (2.0 if "speed" in named else 1.0)
     median = float(np.nanmedian(speed)) if np.isfinite(speed).any() else 0.0
     if median < 0.0:
@@ -187,10 +192,14 @@ def require_evidence(
     known = np.isfinite(offset + width)
     if known.any():
         farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))
-        if wrong := evidence.of_lane_changes(np.concatenate(jumps), np.concatenate(steps), median, farthest):
+        each = (np.concatenate(parts) for parts in zip(*jumps, strict=True))
+        wrong = evidence.of_lane_changes(next(each), next(each), next(each), median, farthest)
+        wrong = wrong or (None if "offset" in named else evidence.of_places(offset, width))
+        if wrong:
             raise FormatError(wrong, path=path, element="column 'offset'")
-    if wrong := None if "time" in named else evidence.of_wander(np.concatenate(wander)):
-        raise FormatError(wrong, path=path, element="column 'time'")
+        in_metres = farthest <= median and LANE_WIDTHS[0] <= median <= LANE_WIDTHS[1]  # else that is said
+        if wrong := evidence.of_wander(np.concatenate(wander)) if in_metres and "time" not in named else None:
+            raise FormatError(wrong, path=path, element="column 'time'")
 
 
 def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
@@ -217,6 +226,8 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     kept = {}
     for name, source in sources.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
+        if name not in LABELS and not pd.api.types.is_numeric_dtype(column):
+            column = column if (commas := comma_numbers(column)) is None else commas
         if name not in LABELS and source.factor != 1.0:
             column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
         kept[name] = column
@@ -232,7 +243,12 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
 
 def from_middle(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
     """Distances to the markings; those of wheels (`wheel_track`) as offset and width: narrow lanes ask for it."""
-    if not {"distance_left", "distance_right"} <= set(table.columns):
+    sides = [name for name in ("distance_left", "distance_right") if name in table.columns]
+    if len(sides) == 1 and "lane_width" in table.columns and "offset" not in table.columns:
+        distance, width = (numbers_of(table[name], path, name) for name in (*sides, "lane_width"))
+        aside = 0.5 * (width - (mapping.wheel_track or 0.0)) - distance
+        return table.drop(columns=sides).assign(offset=aside if sides[0] == "distance_left" else -aside)
+    if len(sides) < 2:
         return table
     left, right = (numbers_of(table[name], path, name) for name in ("distance_left", "distance_right"))
     for name, values in (("distance_left", left), ("distance_right", right)):
@@ -262,10 +278,7 @@ def _numeric_columns(name: str, table: pd.DataFrame, path: Path) -> dict[str, Fl
     if not is_needed and not pd.api.types.is_numeric_dtype(column):
         if column.isna().all():
             return {name: np.full(len(table), np.nan)}
-        numbers = comma_numbers(column)
-        if numbers is None:
-            return indicators(name, column, table.get("drive"), MAX_LEVELS)
-        return {name: numbers.to_numpy(dtype=np.float64)}
+        return indicators(name, column, table.get("drive"), MAX_LEVELS)
     is_plain = column.dtype == np.float64
     values = np.asarray(column, dtype=np.float64) if is_plain else numbers_of(column, path, name)
     if (endless := np.isinf(values)).any():

@@ -13,7 +13,7 @@ count, ``missing = [-9999]``: what stands for no value, ``time_zone = "Europe/Be
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
@@ -31,12 +31,15 @@ from xosc_lateral.base.vehicle_classes import CLASSES, class_of
 from xosc_lateral.files.columns import PLAIN, Stated, as_word, parse_condition
 from xosc_lateral.files.source import read_toml
 
+COMPASS = "compass"
+"""Unit of headings: degrees clockwise from north, which is along y."""
+
 # Factors to SI. Degrees stay apart from radians only by their factor.
 _BY_QUANTITY = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "in": 0.0254},
     "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600, "ft/s": 0.3048},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "angle": {"rad": 1.0, "deg": pi / 180},
+    "angle": {"rad": 1.0, "deg": pi / 180, COMPASS: -pi / 180},
     "angular speed": {"rad/s": 1.0, "deg/s": pi / 180},
     "acceleration": {"m/s2": 1.0, "g": 9.80665},
     "curvature": {"1/m": 1.0, "1/km": 1e-3},
@@ -200,8 +203,8 @@ def classes_of(words: pd.Series, path: Path, column: str) -> pd.Series:
     return words.map(known)
 
 
-MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | str | Path"
-"""A mapping, words or sources by name as of ``--map``, or the file of one."""
+MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | Sequence[str] | Path"
+"""A mapping, words or sources by name, words as of ``--map``, or the file of one."""
 
 
 def as_mapping(mapping: MappingLike | None) -> TableMapping:
@@ -212,6 +215,8 @@ def as_mapping(mapping: MappingLike | None) -> TableMapping:
         return mapping
     if isinstance(mapping, str | Path):
         return read_mapping(Path(mapping))
+    if not isinstance(mapping, Mapping):
+        return TableMapping(parse_map(mapping))
     words = {name: entry for name, entry in mapping.items() if isinstance(entry, str)}
     sources = {name: entry for name, entry in mapping.items() if isinstance(entry, ColumnSource)}
     return TableMapping(sources).with_words(words)

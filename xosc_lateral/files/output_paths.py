@@ -16,7 +16,7 @@ from typing import Any
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.atomic import mend
-from xosc_lateral.files.remote import is_url
+from xosc_lateral.files.remote import brought
 from xosc_lateral.files.source import check_regular, file_hash
 
 STDOUT = "-"  # name of the standard output where an output is asked for
@@ -38,8 +38,7 @@ def path_below(folder: Path, name: str, what: str) -> Path:
 
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file, which in a folder has its usual name. Raises `FormatError` for another suffix."""
-    if is_url(output):
-        raise FormatError("scenarios alone are written to such places; name a file", path=output)
+    output = brought(output)
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"
@@ -55,7 +54,7 @@ def is_folder(output: str | Path) -> bool:
 
 def output_folder(output: str | Path) -> Path:
     """Path of an output folder, which need not be there yet. Raises `FormatError` if a file is there."""
-    path = Path(output)
+    path = Path(brought(output))
     if path.is_file():
         raise FormatError("is a file, expected a folder", path=path)
     return path

@@ -53,7 +53,12 @@ def write_table(
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        table, buffer = pa.Table.from_pandas(frame(), preserve_index=False), io.BytesIO()
+        plain = frame().copy(deep=False)
+        plain.attrs = {}  # which some releases of pyarrow write
+        for name in plain.columns if len(plain) else ():
+            if isinstance(plain[name].iloc[0], dict):  # no column holds an empty record
+                plain[name] = plain[name].map(canonical_json)
+        table, buffer = pa.Table.from_pandas(plain, preserve_index=False), io.BytesIO()
         metadata = {**(table.schema.metadata or {}), METADATA_KEY: canonical_json(stamped(provenance)).encode()}
         pq.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
         write_atomically(path, buffer.getvalue())

@@ -30,6 +30,7 @@ from xosc_lateral.files.atomic import at_once, mend, write_atomically
 from xosc_lateral.files.configuration import configured_libraries
 from xosc_lateral.files.json_text import canonical_json, parse_json
 from xosc_lateral.files.output_paths import file_name, is_own
+from xosc_lateral.files.remote import is_url, local
 from xosc_lateral.files.source import check_regular, guard_input, read_source, state_key
 from xosc_lateral.files.tables import foreign_errors
 
@@ -43,7 +44,7 @@ GROUP = "xosc_lateral.profiles"  # entry points of folders with further profiles
 def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:
     """Path of a profile; see `read_profile`."""
     text = str(name_or_path)
-    path = Path(name_or_path)
+    path = local(name_or_path) if is_url(text) else Path(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
         if not path.exists() or path.is_dir():
             what = "no such file" + did_you_mean(path.stem, [one.stem for one in list_profiles(folders)])

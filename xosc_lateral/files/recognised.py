@@ -16,7 +16,7 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import TRUCKS, class_of
 from xosc_lateral.files.columns import EPOCHS_BEGIN, comma_numbers, no_time, usual_marker
 from xosc_lateral.files.mapping import TableMapping, factor, parts_of
-from xosc_lateral.files.tables import read_table, text_layout
+from xosc_lateral.files.tables import text_layout
 
 HEADERS = {
     "time": r"time|timestamp|t|zeit|zeitstempel|sec|seconds",
@@ -68,7 +68,7 @@ BY_SIZE = {
 }
 """Median sizes that no value in the standard unit has, and the unit that they speak for."""
 
-BESIDE = ("lead_distance", "left_distance", "right_distance")  # no column of 0 and 1 is one of them: it is a flag
+DISTANCES = ("lead_distance", "left_distance", "right_distance")  # no column of 0 and 1 is one of them: it is a flag
 LISTED_TEXTS = 12  # so many different texts are written out at most
 SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "positive in LEFT curves, else :-1/m"}
 
@@ -102,7 +102,7 @@ def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recogni
         spellings = bare, bare.partition("_")[2] or "-"  # whole, and without a word before it
         usual = (name for name, words in known.items() if any(re.fullmatch(words, text) for text in spellings))
         is_flag = all(set(_numbers(table[header])) <= {0.0, 1.0} for table in tables)
-        free = (name for name in (placed, *usual) if name not in headers and not (is_flag and name in BESIDE))
+        free = (name for name in (placed, *usual) if name not in headers and not (is_flag and name in DISTANCES))
         name = next((name for name in free if name is not None), None)
         if name is not None:
             headers[name] = header
@@ -112,14 +112,9 @@ def recognised(tables: Sequence[pd.DataFrame], path: Path) -> tuple[list[Recogni
     return columns, [header for header in shared if header not in values]
 
 
-def propose_mapping(files: Sequence[Path], mapping: TableMapping | None = None) -> str:
-    """TOML of a mapping of these tables, with what each line was guessed from; `mapping`: what is known."""
-    known = mapping or TableMapping()
-    return mapping_text(files, known, *recognised([read_table(path, known) for path in files], files[-1]))
-
-
 def mapping_text(files: Sequence[Path], known: TableMapping, columns: Sequence[Recognised], left: Sequence[str]) -> str:
-    """The same of columns that are `recognised`, and headers that keep their names."""
+    """TOML of a mapping of these tables, of columns that are `recognised` and headers that keep their names, with what
+    each line was guessed from; `known`: what is stated already."""
     headers = {one.name for one in columns}
     needed = ("time",) if SIDES.keys() <= headers else ("time", "offset", "lane_width")
     lines = [

@@ -28,6 +28,9 @@ PathLike = str | Path
 _BROUGHT: dict[Path, str] = {}
 """Copies as they came from elsewhere, or went there, and their `file_state`."""
 
+_AT_ONCE: set[Path] = set()
+"""Folders of copies from which files go back as soon as they are written; of a batch, when it ends."""
+
 _ADDRESS = re.compile(r"([a-z][a-z0-9+.-]+):/+(.+)", re.IGNORECASE)
 """A scheme has two letters at least (``C:/`` is a drive); of ``//``, a `Path` leaves one."""
 
@@ -71,39 +74,61 @@ def inputs_of(paths: Iterable[PathLike]) -> list[Path]:
 @contextmanager
 def sent_back(*outputs: PathLike | None) -> Iterator[list[Any]]:
     """Where to write outputs: of those elsewhere, copies of what is there; what changed goes back, however it ends."""
-    here, folders = list[Any](), list[Path]()
-    for output in outputs:
-        if output is None or not is_url(output):
-            here.append(output)
-            continue
-        url = address(output)
-        with _storage(url) as (files, place):
-            _copies(files, [place], url)
-        here.append(f"{_place(url)}{'/' * url.endswith('/')}")
-        path = _place(url)
-        folders.append(path if path.is_dir() or url.endswith("/") or not path.suffix else path.parent)
+    here: list[Any] = [None if output is None else _brought(output) for output in outputs]
     try:
         yield here
     finally:
-        for folder in folders:
-            _send_back(folder)
+        for output, place in zip(outputs, here, strict=True):
+            if output is not None and is_url(output):
+                _send_back(_folder_of(place))
+
+
+def brought(output: PathLike) -> PathLike:
+    """Where to write an output: itself, or, of one elsewhere, a copy of what is there, which is sent when written."""
+    place = _brought(output)
+    if is_url(output):
+        _AT_ONCE.add(_folder_of(place))
+    return place
+
+
+def _brought(output: PathLike) -> PathLike:
+    if not is_url(output):
+        return output
+    url = address(output)
+    with _storage(url) as (files, place):
+        _copies(files, [place], url)
+    return f"{_place(url)}{'/' * url.endswith('/')}"
+
+
+def _folder_of(place: PathLike) -> Path:
+    path = Path(place)
+    return path if path.is_dir() or str(place).endswith("/") or not path.suffix else path.parent
 
 
 def _send_back(folder: Path) -> None:
     """Take what was written to a copy of a folder there, and remove there what is gone."""
     known = {file for file in _BROUGHT if folder in file.parents}
     for file in sorted(known | {file for file in folder.rglob("*") if file.is_file()}):
-        state = file_state(file)
-        if state == _BROUGHT.get(file):
-            continue
-        with _storage(address(file)) as (files, place):
-            if state:
-                files.makedirs(files._parent(place), exist_ok=True)
-                files.put_file(str(file), place)
-                _BROUGHT[file] = state
-            else:
-                files.rm_file(place)
-                del _BROUGHT[file]
+        _send(file)
+
+
+def send(file: Path) -> None:
+    """A file that was written where it belongs, if this is a copy of one elsewhere."""
+    if _AT_ONCE and _AT_ONCE & {*file.parents}:
+        _send(file)
+
+
+def _send(file: Path) -> None:
+    if (state := file_state(file)) == _BROUGHT.get(file):
+        return
+    with _storage(address(file)) as (files, place):
+        if state:
+            files.makedirs(files._parent(place), exist_ok=True)
+            files.put_file(str(file), place)
+            _BROUGHT[file] = state
+        else:
+            files.rm_file(place)
+            del _BROUGHT[file]
 
 
 def _files_of(path: PathLike, *, is_pattern: bool) -> list[Path]:

@@ -353,7 +353,7 @@ class Part(StrEnum):
 
 PROFILE = flag("--profile", "-p", kind=str, metavar="NAME|PATH", help="Driver profile.")
 MAPPING = flag("--mapping", kind=Path | None, metavar="FILE.toml",
-    help="Saved mapping of columns (import table --propose FILE...).")  # fmt: skip
+    help="Saved mapping of columns (check TABLE... --write-mapping writes a first one).")  # fmt: skip
 
 # fmt: off
 SHARED: Mapping[str, Option] = {

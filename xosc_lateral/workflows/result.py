@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import wraps
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.note import Note, Telling, rows_left_out, warnings
+from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.files.source import parsed_hash, parsed_hashes
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.options import paths as as_paths
@@ -26,9 +29,18 @@ if TYPE_CHECKING:
 
 
 class Result(Telling, ABC):
-    """A result: a line as its `repr`, the command line's text as its `str`, a table, and JSON values."""
+    """A result: a line as its `repr`, the command line's text as its `str`, a table, and JSON values.
+
+    It is a value: it can be copied, and pickled into another process.
+    """
 
     __slots__ = ()
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        """Whoever makes a table makes one whose columns have units."""
+        super().__init_subclass__(**settings)
+        if made := vars(cls).get("to_frame"):
+            cls.to_frame = with_units(made)  # type: ignore[method-assign]
 
     @abstractmethod
     def headline(self) -> str:
@@ -54,6 +66,58 @@ class Result(Telling, ABC):
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
 
+    @property
+    def usual_table(self) -> str:
+        """What its table is called in a folder."""
+        return f"{type(self).__name__.lower()}.csv"
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance, whole or not at all."""
+        from xosc_lateral.files.output_paths import claim, output_file
+        from xosc_lateral.files.output_tables import output_suffixes, write_table
+
+        output = output_file(path, self.usual_table, output_suffixes())
+        claim([output], getattr(self, "files", ()), force=force)
+        write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
+        return output
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.files.output_tables import csv_text
+
+        return csv_text(self.to_frame())
+
+    def _provenance(self) -> Mapping[str, Any]:
+        """What it was made from."""
+        return {"inputs": parsed_hashes(getattr(self, "files", ()))}
+
+
+UNITS: Mapping[str, str] = {
+    **CONTEXT_UNITS,
+    **dict.fromkeys(("time", "start", "end"), "s"),
+    **dict.fromkeys(("h", "heading"), "rad"),
+    **dict.fromkeys(("offset", "offset_real", "offset_t", "deviation"), "m"),
+    **dict.fromkeys(("s", "x", "y", "z", "x_nominal", "y_nominal"), "m"),
+}
+"""Column of a result -> its unit, where its name does not say it."""
+SUFFIXES = {"m": "m", "s": "s", "h": "h", "hz": "Hz"}
+
+
+def with_units(to_frame: Callable[..., pd.DataFrame]) -> Callable[..., pd.DataFrame]:
+    """The same table, its columns in words joined by underscores, their units in `attrs["units"]`."""
+
+    @wraps(to_frame)
+    def described(self: Any, *args: Any, **settings: Any) -> pd.DataFrame:
+        frame = to_frame(self, *args, **settings)
+        named = {name: re.fullmatch(r"(.+) \[(.+)\]", str(name)) for name in frame.columns}
+        stated = {re.sub(r"\W+", "_", found[1]): found[2] for found in named.values() if found}
+        frame = frame.rename(columns={name: re.sub(r"\W+", "_", found[1]) for name, found in named.items() if found})
+        known = {name: UNITS.get(name) or SUFFIXES.get(str(name).rpartition("_")[2]) for name in frame.columns}
+        frame.attrs["units"] = {name: unit for name, unit in (known | stated).items() if unit and unit != "-"}
+        return frame
+
+    return described
+
 
 PAGE_SUFFIXES = (".html", ".htm")
 
@@ -68,25 +132,6 @@ def write_page(
     output = output_file(path, usual_name, PAGE_SUFFIXES)
     claim([output], inputs, force=force)
     return write_atomically(output, html())
-
-
-def write_table(
-    path: PathLike,
-    usual_name: str,
-    frame: Callable[[], pd.DataFrame],
-    provenance: Callable[[], Mapping[str, Any]],
-    *,
-    inputs: Iterable[Path] = (),
-    force: bool = False,
-) -> Path:
-    """Write a table with its provenance beside it, if need be into a folder; made only if it may be written there."""
-    from xosc_lateral.files.output_paths import claim, output_file
-    from xosc_lateral.files.output_tables import output_suffixes, write_frame
-
-    output = output_file(path, usual_name, output_suffixes())
-    claim([output], inputs, force=force)
-    write_frame(frame(), output, provenance())
-    return output
 
 
 __all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile"]

@@ -30,9 +30,32 @@ def changing(rng: np.random.Generator, seconds: float = 60.0, step: float = 0.1)
 def test_lane_changes_prove_side_and_unit(turned: float, factor: float, words: str | None) -> None:
     time, offset, lane = changing(np.random.default_rng(1))
     offset = turned * factor * offset
-    jumps, steps = evidence.jumps_of(time, offset, np.full(len(time), WIDTH), lane)
-    said = evidence.of_lane_changes(jumps, steps, WIDTH, float(np.quantile(np.abs(offset), 0.999)))
-    assert said is None if words is None else words in (said or "")
+    assert says(time, offset, lane) is None if words is None else words in (says(time, offset, lane) or "")
+
+
+def says(time: np.ndarray, offset: np.ndarray, lane: np.ndarray | None) -> str | None:
+    jumps = evidence.jumps_of(time, offset, np.full(len(time), WIDTH), lane)
+    return evidence.of_lane_changes(*jumps, WIDTH, float(np.quantile(np.abs(offset), 0.999)))
+
+
+@pytest.mark.parametrize(("origin", "sign", "options"), [
+    (0.5, -1.0, "(distance_left=COLUMN)"), (0.5, 1.0, "(distance_left=COLUMN:-m)"),
+    (-0.5, 1.0, "(distance_right=COLUMN)"), (-0.5, -1.0, "(distance_right=COLUMN:-m)"),
+])  # fmt: skip
+def test_an_offset_from_a_marking_is_told_with_its_side(origin: float, sign: float, options: str) -> None:
+    time, offset, lane = changing(np.random.default_rng(1))
+    counted = sign * (offset - origin * WIDTH)
+    assert options in (says(time, counted, lane) or "")
+    both = says(time, counted, None) or ""
+    assert "distance_left" in both and "distance_right" in both
+
+
+def test_an_offset_from_a_marking_is_told_without_lane_changes() -> None:
+    rng = np.random.default_rng(2)
+    offset = 0.3 * np.sin(np.arange(600) / 30.0) + 0.02 * rng.normal(size=600)
+    width = np.full(600, WIDTH)
+    assert "distance_left=COLUMN, or" in (evidence.of_places(0.5 * width - offset, width) or "")
+    assert evidence.of_places(offset, width) is evidence.of_places(offset + 0.8, width) is None
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -121,3 +144,18 @@ def test_a_drive_that_is_there_twice_is_told() -> None:
     assert not evidence.of_drives([one, other], [width] * 2)
     (said,) = evidence.of_drives([one, other, one], [width] * 3)
     assert said.startswith("1 of 3 drives repeat another one")
+
+
+def test_a_number_that_stands_for_no_value_is_told_where_it_comes_again_and_again() -> None:
+    rng = np.random.default_rng(3)
+    offset = 0.3 * np.sin(np.arange(3000) / 80.0) + 0.005 * rng.normal(size=3000)
+    rounded = np.round(offset, 1)  # a coarse sensor repeats itself, too
+    assert evidence.of_marker(offset) is evidence.of_marker(rounded) is None
+    for value in (-1.0, 0.0):
+        gone = np.where(np.arange(3000) % 700 < 40, value, offset)
+        assert f"missing = [{value:g}]" in (evidence.of_marker(gone) or ""), value
+
+
+def test_sizes_in_feet_are_told_by_the_width() -> None:
+    long, wide = np.full(9, 4.6), np.full(9, 1.8)
+    assert "length=COLUMN:ft, width=COLUMN:ft" in (evidence.of_sizes(long / 0.3048, wide / 0.3048) or "")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.recordings import WIDTH, write_mf4
+from xosc_lateral import import_drives
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.drivers.drives.drive import cut_runs
 from xosc_lateral.extras.recordings.importers import ImportedDrives
@@ -122,6 +123,8 @@ def test_markers_and_missing_units_are_said(tmp_path) -> None:
     with pytest.raises(FormatError, match=r"missing = \[-9999\]"):
         import_mf4(path, ["offset=Lat", "lane_width=Width", "speed=V"])
     (tmp_path / "m.toml").write_text("missing = [-9999]")
-    found = import_mf4(path, ["offset=Lat", "lane_width=Width", "speed=V"], mapping=tmp_path / "m.toml")
+    found = import_drives(
+        "mf4", path, channels=["offset=Lat", "lane_width=Width", "speed=V"], mapping=tmp_path / "m.toml"
+    )
     np.testing.assert_allclose(found.table["offset"], 0.1 * np.sin(found.table["time"]), atol=1e-3)
     assert "speed: channel V has no unit, m/s is taken" in found.provenance.notes

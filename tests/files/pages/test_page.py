@@ -75,7 +75,7 @@ def test_a_folded_section_ends_where_the_next_one_begins_and_keeps_its_heading_i
     page.section("Folded", "second", folded=True)
     page.section("Folded, too", "third", folded=True)
     main = re.search(r"<main>(.*)</main>", page.html({}), re.S)[1].replace("\n", "")
-    details = re.findall(r'<details><summary>(.*?)</summary>(.*?)</details>', main)
+    details = re.findall(r"<details><summary>(.*?)</summary>(.*?)</details>", main)
     assert [re.sub("<[^>]+>", "", head) for head, _ in details] == ["Folded", "Folded, too"]
     assert [body for _, body in details] == ["<p>second</p>", "<p>third</p>"]
     assert main.index("first") < main.index("<details")

@@ -3,8 +3,8 @@
 Each question gives a line with the option that mends it, or None. What contradicts itself is refused by who asks; what
 only makes results worse is a note. Limits are where the two readings part, not how far real driving goes:
 
-- unit and side of the offset: two lane changes that agree, within 15 % of a lane's width; of 130 motorway vehicles with
-  two, 128 are found when turned or written in feet, and none of 445 and 567 real ones is as it is;
+- unit, side and origin of the offset: two lane changes that agree, within 15 % of a lane's width; of 130 motorway
+  vehicles with two, 128 are found when turned or written in feet, and none of 445 and 567 real ones is as it is;
 - rows in turns: twice the change from row to row that there is over several; white noise gives 1;
 - clock: 1 kHz to one row in 2 s; minutes: sideways at 0.3 m/s in the median, where drivers keep lanes at 0.1;
 - shift of a map: two standard deviations of 445 real vehicles' mean offsets, 0.42 m, or half of it between the two
@@ -28,10 +28,14 @@ LEAST_JUMPS = 2  # lane changes that say the same
 AGREED = 0.75  # of them, at least: cameras and maps that count lanes change at another row than the offset now and then
 JUMP_WINDOW = 1.0  # lane numbers change up to so long before or after the offset jumps [s]
 FASTEST_ASIDE = 3.0  # no vehicle moves sideways as fast: what does between two rows is another lane [m/s]
+LEAST_LEAPS = 3  # stretches, and rows of each in the mean: a value that stands for none comes several times
 BEYOND_NOISE = 10.0  # times as far as from row to row: 7 standard deviations of noise [-]
 SYMMETRIC = 0.25  # the offset before a jump is that after it on the other side, give or take so much of the jump
 WIDTH_KEPT = 0.1  # of a lane's width that it may change by where the lane does: else a marking was misjudged
 SIZE_AGREED = 0.15  # a row's way aside in a lane change is no more of a lane's width; units are a factor of 3 apart
+ON_MARKING = 0.35, 0.65
+"""Medians of offset / lane width between the middle and a marking: 5 standard deviations of 445 vehicles' means. [-]"""
+ONE_SIDED = 0.95
 UNIT_SIZES = {"cm": 1e2, "mm": 1e3, "ft": 1.0 / 0.3048, "km": 1e-3}
 ALTERNATING = 2.0
 """White noise differs from row to row as over several rows (1), driving less; two vehicles in turns more. [-]"""
@@ -43,6 +47,8 @@ MINUTES_WINDOW = 0.25  # 15 s in minutes: noise is averaged out over it, and a d
 LEAST_WINDOWS = 8
 WANDER_RATE = 0.3  # nobody who keeps a lane moves sideways as fast half of the time: 0.02 to 0.1 m/s do [m/s]
 USUAL_WIDTH = 1.8  # [m]
+USUAL_WIDTHS = 1.4, 2.7  # of cars to trucks in the median, with what errs [m]
+MOST_WIDTH = 3.5  # median: 2.55 m are allowed (directive 96/53/EC), boxes err by decimetres [m]
 FARTHEST_MEAN = 0.42  # two standard deviations of the mean offsets of 445 vehicles on a motorway: no traffic's mean [m]
 LEAST_VEHICLES = 5
 NEAR_ZERO = 0.1  # of the standard deviation of an offset [-]
@@ -53,17 +59,18 @@ SURE_ERRORS = 2.0  # standard errors
 # ---- signs and units, by lane changes --------------------------------------------------------------------------------
 def jumps_of(
     time: FloatArray, offset: FloatArray, width: FloatArray, lane: FloatArray | None
-) -> tuple[FloatArray, FloatArray]:
-    """Jumps of one drive's offset from one marking to the other, to the left above 0, shape (k,); [m] and how many
-    lanes `lane` steps to the left about then (NaN: none, or several times)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Jumps of one drive's offset from one marking to the other, to the left above 0, shape (k,) [m]; their middles
+    [m]; and how many lanes `lane` steps to the left about then (NaN: none, or several times)."""
     good = np.isfinite(time + offset + width)
     time, offset, width = time[good], offset[good], width[good]
-    jump, step = np.diff(offset), np.diff(time)
+    jump, step, middle = np.diff(offset), np.diff(time), 0.5 * (offset[1:] + offset[:-1])
     if not len(jump):
-        return jump, jump
+        return jump, jump, jump
     least = np.maximum(FASTEST_ASIDE * step, BEYOND_NOISE * np.median(np.abs(jump)))
     leap = (np.abs(jump) > least) & (step <= JUMP_WINDOW)
-    leap &= np.abs(offset[1:] + offset[:-1]) < SYMMETRIC * np.abs(jump)
+    ends = np.abs(middle), np.abs(np.abs(middle) - 0.5 * np.abs(jump))  # from the middle, or from a marking
+    leap &= np.minimum(*ends) < 0.5 * SYMMETRIC * np.abs(jump)
     leap &= np.abs(np.diff(width)) < WIDTH_KEPT * np.minimum(width[1:], width[:-1])
     at = np.flatnonzero(leap)
     steps = np.full(len(at), np.nan)
@@ -74,30 +81,58 @@ def jumps_of(
         for k, row in enumerate(at.tolist()):
             near = moved[moved != 0.0][np.abs(when - time[row]) <= JUMP_WINDOW]
             steps[k] = near[0] if len(near) == 1 else np.nan
-    return jump[at], steps
+    return jump[at], middle[at], steps
 
 
-def of_lane_changes(jumps: FloatArray, steps: FloatArray, width: float, farthest: float) -> str | None:
-    """What lane changes of all drives say of the offset's unit and side; `width` as believed, `farthest`: the offset is
-    hardly ever farther from 0. [m]"""
+def of_lane_changes(
+    jumps: FloatArray, middles: FloatArray, steps: FloatArray, width: float, farthest: float
+) -> str | None:
+    """What lane changes of all drives say of the offset's unit, side and where it counts from; `width` as believed,
+    `farthest`: the offset is hardly ever farther from 0. [m]"""
     sizes = {"m": width, "lane widths": 1.0, **{unit: width * by for unit, by in UNIT_SIZES.items()}}
     fits = {unit: np.abs(np.log(np.abs(jumps) / size)) < SIZE_AGREED for unit, size in sizes.items()}
     unit = max(fits, key=lambda name: int(fits[name].sum()))
     count = int(fits[unit].sum())
     if count < max(LEAST_JUMPS, AGREED * len(jumps)):
         return None
+    side = (np.sign(jumps) * np.sign(steps))[fits[unit] & np.isfinite(steps)]
+    wrong = int((side > 0.0).sum())  # to the left, by a lane more from the right, the offset jumps to the right
+    aside = middles[fits[unit]] / sizes[unit]
+    if (np.abs(aside) > 0.5 * SYMMETRIC).sum() >= AGREED * count:
+        backwards = "-" if np.median(aside) < 0.0 else ""
+        name = (unit if unit != "lane widths" else f"{width:.4g} m") if unit != "m" or backwards else ""
+        from_left = None if not len(side) else (wrong > 0.5 * len(side)) != bool(backwards)
+        return from_marking(f"{count} lane changes move it from 0 to {sizes[unit]:.3g}", from_left, backwards + name)
     if unit != "m":
         if farthest > (0.5 + WIDTH_KEPT) * sizes[unit]:
             return None
         option = f"{width:.4g} m" if unit == "lane widths" else unit
         what = f"{count} lane changes move it by {sizes[unit]:.3g}, in lanes of {width:.3g} m: it is in {unit}"
         return f"{what}, offset=COLUMN:{option}"
-    side = (np.sign(jumps) * np.sign(steps))[fits[unit] & np.isfinite(steps)]
-    wrong = int((side > 0.0).sum())  # to the left, by a lane more from the right, the offset jumps to the right
     if wrong < max(LEAST_JUMPS, AGREED * len(side)):
         return None
     what = f"in {wrong} of {len(side)} lane changes the offset jumps to the side that lane_index steps to"
     return f"{what}: it is positive to the right (offset=COLUMN:-m), or lane_index counts from the left"
+
+
+def from_marking(what: str, from_left: bool | None = None, unit: str = "") -> str:
+    """That an offset is the distance to a marking; `from_left`: to which, if that is known."""
+    sides = ["left"] * (from_left is not False) + ["right"] * (not from_left)
+    options = ", or ".join(f"distance_{side}=COLUMN{unit and f':{unit}'}" for side in sides)
+    return f"{what}: it counts from the {' or '.join(sides)} marking ({options}), not from the lane's middle"
+
+
+def of_places(offset: FloatArray, width: FloatArray) -> str | None:
+    """Whether vehicles drive on a marking, all to the same side, as where offsets count from one."""
+    good = np.isfinite(offset + width)
+    place = offset[good] / width[good]
+    if len(place) < 100 or not ON_MARKING[0] < abs(float(np.median(place))) < ON_MARKING[1]:
+        return None
+    if (np.sign(place) == np.sign(np.median(place))).mean() < ONE_SIDED:
+        return None
+    backwards = "-m" if np.median(place) < 0.0 else ""
+    what = f"is {float(np.median(offset[good])):.3g} m (median): vehicles would drive on a marking"
+    return f"{from_marking(what, None, backwards)}; if it does, offset=COLUMN:m"
 
 
 # ---- who is who, and when --------------------------------------------------------------------------------------------
@@ -108,6 +143,23 @@ def in_turns(values: FloatArray) -> int:
         return 1
     apart = [float(np.median(np.abs(known[k:] - known[:-k]))) for k in range(1, MOST_IN_TURNS + 1)]
     return next((k for k, change in enumerate(apart, start=1) if apart[0] > max(ALTERNATING * change, LEAST_APART)), 1)
+
+
+def of_marker(values: FloatArray) -> str | None:
+    """Whether one number stands for no value: sorted values leap to it and from it, again and again."""
+    values = values[np.isfinite(values)]
+    change = np.abs(np.diff(values))
+    same = np.flatnonzero(change == 0.0)
+    if not len(same) or len(same) > 0.5 * len(change):  # else it is one that repeats what it has
+        return None
+    known, count = np.unique(values[same], return_counts=True)
+    value = float(known[count.argmax()])
+    begins = np.flatnonzero((values[1:] == value) & (values[:-1] != value))
+    leaps = change[begins] > BEYOND_NOISE * float(np.median(change[change > 0.0]))
+    if leaps.sum() < LEAST_LEAPS or leaps.mean() < AGREED or count.max() < LEAST_LEAPS * len(begins):
+        return None
+    what = f"is exactly {value:g} in {len(begins)} stretches that it leaps to"
+    return f"{what}: if that stands for no value, the mapping needs missing = [{value:g}], else missing = []"
 
 
 def of_clock(time: FloatArray, slowest: float = SLOWEST_STEP, *, is_named: bool = False) -> str | None:
@@ -241,6 +293,11 @@ def of_sizes(length: FloatArray, width: FloatArray | None) -> str | None:
         return f"{100 * share:.0f} % of the vehicles are wider than long: length and width are exchanged"
     if known.any() and (median := float(np.median(length[known]))) > 60.0:
         return f"vehicles are {median:.4g} m long: length=COLUMN:{'cm' if median < 6000.0 else 'mm'}"
+    broad = float(np.median(wide[both])) if both.any() else 0.0
+    unit = next((unit for unit, by in UNIT_SIZES.items() if USUAL_WIDTHS[0] < broad / by < USUAL_WIDTHS[1]), None)
+    if broad > MOST_WIDTH and unit:
+        sizes, places = (f"{a}=COLUMN:{unit}, {b}=COLUMN:{unit}" for a, b in (("length", "width"), ("x", "y")))
+        return f"vehicles are {broad:.3g} m wide: {sizes}; and {places}, if these are too"
     return None
 
 

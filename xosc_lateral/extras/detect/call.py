@@ -69,6 +69,8 @@ def detect(
     road: Annotated[RoadLike | None, flag("--road", kind=list[Path] | None, metavar="FILE|FOLDER",
         show_default=False, gives=roads,
         help="OpenDRIVE file of a recording without one; folder with roads known by name, may be repeated.")] = None,
+    format: Annotated[str | None, flag("--format", metavar="FORMAT", show_default=False,  # noqa: A002
+        help="Of recordings, where their files do not show it: dlr-ht, levelx, osi, tracks ...")] = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     allow: Paths = (),
@@ -142,7 +144,7 @@ def detect(
     convert = ConvertSettings.of(seed=seed, library=library, allow=allow, road_path=road_path, time_limit=time_limit)
     settings = SourceSettings(
         convert, variants, (profiles,) if isinstance(profiles, str) else tuple(profiles), ego,
-        columns=as_mapping(columns), sensor=read_sensor(sensor) if isinstance(sensor, str) else sensor,
+        columns=as_mapping(columns), kind=format, sensor=read_sensor(sensor) if isinstance(sensor, str) else sensor,
     )  # fmt: skip
     if isinstance(road, str | os.PathLike):
         settings = settings.on(Path(road))

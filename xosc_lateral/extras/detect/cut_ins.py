@@ -23,7 +23,7 @@ from xosc_lateral.extras.detect.vary import Variations, vary
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.batch.request import Request, concrete, document_kind
-from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
+from xosc_lateral.workflows.result import PathLike, Result, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -107,6 +107,7 @@ def _result(tally: Tally) -> dict[str, Any]:
 class CutIns(Result):
     """Cut-ins, set by set, and what detectors made of them."""
 
+    usual_table = "cut-ins.csv"
     scenario: Path
     profile: str
     seed: int
@@ -162,16 +163,16 @@ class CutIns(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         return {"scenario": str(self.scenario), "profile": self.profile, "variations": self.variations.to_dict(),
-                "rows": plain(list(self.rows)), "provenance": self.provenance()}  # fmt: skip
+                "rows": plain(list(self.rows)), "provenance": self._provenance()}  # fmt: skip
 
-    def provenance(self) -> dict[str, Any]:
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """That were read."""
+        return (self.scenario,)
+
+    def _provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
-        return {"seed": self.seed, "profile": self.profile, "inputs": parsed_hashes([self.scenario])}
-
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        inputs = [self.scenario]
-        return write_table(path, "cut-ins.csv", self.to_frame, self.provenance, inputs=inputs, force=force)
+        return {"seed": self.seed, "profile": self.profile, "inputs": parsed_hashes(self.files)}
 
     def plot(self) -> Figure:
         """How each figure is spread over the sets."""
@@ -202,4 +203,4 @@ class CutIns(Result):
         page.table([dict(zip(DETECTOR_HEADINGS, one, strict=True)) for one in self._detectors()], "Over all sets")
         page.section("Cut-ins")
         page.table(list(self.rows), "Set by set")
-        return page.html(self.provenance())
+        return page.html(self._provenance())

@@ -20,7 +20,7 @@ from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import moves_in_lane
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
+from xosc_lateral.workflows.result import PathLike, Result, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -176,10 +176,10 @@ class Detection(Result):
                  "time": round(case.time, 3)}
                 for source, detector, case in self.worst()
             ],
-            "provenance": self.provenance(),
+            "provenance": self._provenance(),
         }  # fmt: skip
 
-    def provenance(self) -> dict[str, Any]:
+    def _provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
         files = [path for source in (*self.origins, *self.homes) for path in source.files if path.is_file()]
         return {"seed": self.seed, "inputs": parsed_hashes(files)}
@@ -189,10 +189,6 @@ class Detection(Result):
         from xosc_lateral.extras.detect.page import curves_figure
 
         return curves_figure(self.curves)
-
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table with every threshold: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        return write_table(path, "detection.csv", self.to_frame, self.provenance, inputs=self.files, force=force)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table, curves, and the worst cases in the player."""
@@ -204,7 +200,7 @@ class Detection(Result):
             table=[dict(zip(self.headings, cells(row), strict=True)) for row in self.rows()],
             curves=[curve for curve in self.curves if is_met(curve.detector)],
             worst=self.worst(),
-            provenance=self.provenance(),
+            provenance=self._provenance(),
         )
         return write_page(path, "detection.html", html, inputs=self.files, force=force)
 

@@ -20,7 +20,7 @@ from xosc_lateral.extras.detect.sources import Source, checked
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Rows, Scene
 from xosc_lateral.extras.detect.visibility import Boxes, points_seen, visible_share
 from xosc_lateral.files.source import parsed_hashes
-from xosc_lateral.workflows.result import PathLike, Result, write_page, write_table
+from xosc_lateral.workflows.result import PathLike, Result, write_page
 
 if TYPE_CHECKING:
     from xosc_lateral.files.pages.figure import Figure
@@ -126,6 +126,7 @@ def _lane_centre(
 class Sight(Result):
     """What sensors see past the car ahead, by source."""
 
+    usual_table = "detection.csv"
     moments: Mapping[str, Sequence[SightMoment]]  # label of the source -> moments
     origins: Sequence[Source]
     seed: int
@@ -177,9 +178,14 @@ class Sight(Result):
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         sources = [{"label": one.label, "files": [path.name for path in one.files]} for one in self.origins]
-        return {"sources": sources, "sight": plain(self.rows()), "bands": self.bands(), "provenance": self.provenance()}
+        return {
+            "sources": sources,
+            "sight": plain(self.rows()),
+            "bands": self.bands(),
+            "provenance": self._provenance(),
+        }
 
-    def provenance(self) -> dict[str, Any]:
+    def _provenance(self) -> dict[str, Any]:
         """Seed and hashes of all inputs."""
         files = [path for source in self.origins for path in source.files if path.is_file()]
         return {"seed": self.seed, "inputs": parsed_hashes(files)}
@@ -202,10 +208,6 @@ class Sight(Result):
             )
         return figure
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        return write_table(path, "detection.csv", self.to_frame, self.provenance, inputs=self.files, force=force)
-
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table and figure."""
         from xosc_lateral.files.pages.page import Page
@@ -216,7 +218,7 @@ class Sight(Result):
         page.table([dict(zip(HEADINGS, _cells(row), strict=True)) for row in self.rows()], "In brackets 95 % intervals")
         page.section("By distance")
         page.figure(self.plot(), "How often any part of the car before the car ahead is seen")
-        html = partial(page.html, self.provenance())
+        html = partial(page.html, self._provenance())
         return write_page(path, "detection.html", html, inputs=self.files, force=force)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -36,7 +37,7 @@ from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
-from xosc_lateral.workflows.result import GivenDrives, given_drives
+from xosc_lateral.workflows.result import given_drives
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.player.player import play
 
@@ -67,6 +68,7 @@ class SourceSettings:
     columns: TableMapping = field(default_factory=lambda: as_mapping(None))
     held: Held | None = None  # a scenario in memory
     sensor: Sensor = PERFECT_SENSOR  # through which detectors see
+    kind: str | None = None  # format of a recording; None: as its file shows
 
     def on(self, road: Path | None, held: Held | None = None) -> SourceSettings:
         """The same, with a road that counts whatever a scenario says."""
@@ -90,9 +92,10 @@ def sources_of(path: Path, settings: SourceSettings) -> list[Source]:
     base = path if path.is_dir() else path.parent
     named = list(_named(scenarios, base, settings.convert))
     files = tuple(dict.fromkeys((*scenarios, *(each[0] for each in named))))
-    sources = [Source(path.stem, lambda: _written(named, settings), files)]
+    sources = [Source(path.stem, partial(_written, named, settings), files)]
     profiles = settings.profiles if settings.variants else ()
-    return [*sources, *(_lifelike(path.stem, named, profile, settings, files) for profile in profiles)]
+    made = {profile: partial(_lifelike, named, profile, settings) for profile in profiles}
+    return [*sources, *(Source(f"{path.stem}, {profile}", scenes, files) for profile, scenes in made.items())]
 
 
 Named: TypeAlias = tuple[Path, str, ConvertSettings, int]
@@ -121,12 +124,14 @@ def _named(scenarios: Sequence[Path], base: Path, convert: ConvertSettings) -> I
 
 
 def _measured(path: Path, settings: SourceSettings) -> Source:
-    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and format_of(path) == "tracks"
+    is_table = (path.is_dir() or path.name.lower().endswith(TABLE_SUFFIXES)) and (
+        settings.kind or format_of(path)
+    ) == "tracks"
     told_lines = dict[str, None]()
     if is_table and settings.road is None:
-        read = lambda: _driven(given_drives(path, settings.columns), told_lines)  # noqa: E731
+        read = partial(_driven, path, settings, told_lines)
     else:
-        read = lambda: _recorded(path, settings, told_lines)  # noqa: E731
+        read = partial(_recorded, path, settings, told_lines)
     return Source(path.name.split(".")[0], read, (path,), told_lines)
 
 
@@ -137,22 +142,16 @@ def _written(named: Sequence[Named], settings: SourceSettings) -> Iterator[Scene
         yield played_scene(_play(scenario, convert), name, settings.ego)
 
 
-def _lifelike(
-    label: str, named: Sequence[Named], profile: str, settings: SourceSettings, files: tuple[Path, ...]
-) -> Source:
+def _lifelike(named: Sequence[Named], profile: str, settings: SourceSettings) -> Iterator[Scene]:
     """Each scenario's variants, converted and played as what is written plays."""
     ego = None if settings.ego is None else frozenset({settings.ego} - {"none"})
-
-    def scenes() -> Iterator[Scene]:
-        for scenario, name, requested, number in named:
-            convert = replace(requested, profile=profile, ego=ego)
-            for variant in range(settings.variants):
-                index = number * settings.variants + variant  # each set has offsets of its own
-                made, played = converted(scenario, convert, index)
-                ego_name = settings.ego or next(iter(made.provenance.ego), "none")
-                yield played_scene(played, f"{name} #{variant + 1}", ego_name, cluster=name)
-
-    return Source(f"{label}, {profile}", scenes, files)
+    for scenario, name, requested, number in named:
+        convert = replace(requested, profile=profile, ego=ego)
+        for variant in range(settings.variants):
+            index = number * settings.variants + variant  # each set has offsets of its own
+            made, played = converted(scenario, convert, index)
+            ego_name = settings.ego or next(iter(made.provenance.ego), "none")
+            yield played_scene(played, f"{name} #{variant + 1}", ego_name, cluster=name)
 
 
 def converted(scenario: Path, convert: ConvertSettings, index: int) -> tuple[Conversion, Played]:
@@ -187,14 +186,15 @@ def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "
 
 
 # ---- measured traffic ------------------------------------------------------------------------------------------------
-def _driven(tables: GivenDrives, told_lines: dict[str, None]) -> Iterator[Scene]:
+def _driven(path: Path, settings: SourceSettings, told_lines: dict[str, None]) -> Iterator[Scene]:
+    tables = given_drives(path, settings.columns)
     told_lines |= dict.fromkeys(tables.evidence())
     return drive_scenes(tables.drives)
 
 
 def _recorded(path: Path, settings: SourceSettings, told_lines: dict[str, None]) -> Iterator[Scene]:
     """Tracks of several vehicles, a scene for each recording."""
-    for traffic in read_recordings(path, road=settings.road, columns=settings.columns):
+    for traffic in read_recordings(path, kind=settings.kind, road=settings.road, columns=settings.columns):
         told_lines |= dict.fromkeys(traffic.notes)
         yield _scene_of(traffic, path, settings)
 

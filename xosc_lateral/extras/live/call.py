@@ -16,7 +16,7 @@ from xosc_lateral.extras.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
-from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile, write_table
+from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
 if TYPE_CHECKING:
     from xosc_lateral.extras.live.scene import SimulatorScene
@@ -150,6 +150,7 @@ def live_sumo(
 class LiveRun(Result):
     """A run of a simulation with drivers in it."""
 
+    usual_table = "states.csv"
     __slots__ = ("_messages", "_rows", "_scene", "_settings", "events")
 
     def __init__(
@@ -196,9 +197,8 @@ class LiveRun(Result):
             **self._settings,
         }
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        return write_table(path, "states.csv", self.to_frame, lambda: self._settings, force=force)
+    def _provenance(self) -> Mapping[str, Any]:
+        return self._settings
 
     def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
         """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step.

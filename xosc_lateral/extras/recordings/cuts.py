@@ -23,7 +23,7 @@ from xosc_lateral.base.rows import blocks
 from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course
-from xosc_lateral.world.road.network import RoadNetwork
+from xosc_lateral.files.mapping import COMPASS
 
 KEPT_ROWS = "kept"
 
@@ -154,7 +154,6 @@ def _runs(new: BoolArray) -> IntArray:
 MOVING_SPEED = 3.0  # slower vehicles have no direction: 2 cm of noise in 0.4 s turn the way at 3 m/s by 1 degree [m/s]
 LANE_AGREEMENT = 0.7  # cosine of a vehicle's direction and that of the lane that it is taken to follow: 45 degrees [-]
 HEADING_AGREEMENT = 0.94  # cosine of a vehicle's heading and of its way: 20 degrees, as of its front at R = 10 m [-]
-WITHIN_EARTH = 4e7  # places beyond are none: the earth's girth [m]
 MAX_AGAINST = 0.1
 """Share of the moving rows that may contradict: mirrored or turned recordings have all, or half where headings are
 random; overtaking in the oncoming lane and vehicles that reverse have a few in a hundred. [-]"""
@@ -177,7 +176,7 @@ def require_headings(heading: FloatArray, way: FloatArray, speed: FloatArray, pa
         CLOCKWISE: -heading,
         NORTH: 0.5 * np.pi - heading,
         "in degrees, " + CLOCKWISE: -np.radians(heading),
-        "in degrees, " + NORTH: 0.5 * np.pi - np.radians(heading),
+        f"in degrees, {NORTH}, heading=COLUMN:{COMPASS}": 0.5 * np.pi - np.radians(heading),
     }
     shares = {name: _share(np.cos(other - way)[moving] < HEADING_AGREEMENT) for name, other in meant.items()}
     likely = min(shares, key=lambda name: shares[name])
@@ -196,26 +195,6 @@ def require_lane_direction(agreement: FloatArray, speed: FloatArray, where: str,
         what = f"{100 * share:.0f} % of the moving rows drive against the direction of their lanes in {where}: {cause}"
         raise FormatError(what, path=path)
     return np.asarray(against)
-
-
-def require_along_lanes(
-    network: RoadNetwork, x: FloatArray, y: FloatArray, heading: FloatArray, speed: FloatArray, path: Path
-) -> tuple[FloatArray, FloatArray]:
-    """Refuse places in the coordinates of a road's file that drive against its lanes; else their offsets to the left of
-    the lane's direction and its widths, NaN in none. [m], [rad], [m/s]"""
-    near = np.flatnonzero(np.abs(x) + np.abs(y) < WITHIN_EARTH)
-    place = network.world_to_lane(x[near], y[near], heading=heading[near])
-    inside = (place.distance <= 0.0) & (place.lane != 0)
-    lane = network.lane_to_world(place.road[inside], place.lane[inside], place.s[inside])
-    agreement, offset, width = np.full((3, len(x)), np.nan)
-    there = near[inside]
-    agreement[there] = np.cos(heading[there] - lane.heading)
-    offset[there], width[there] = (
-        place.offset[inside],
-        network.lane_width(place.road[inside], place.lane[inside], place.s[inside]),
-    )
-    require_lane_direction(agreement, speed, Path(network.path).name or "its lanes", path)
-    return offset, width
 
 
 def is_right_to_left(

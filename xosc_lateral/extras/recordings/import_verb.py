@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Options, Written, command, pairs, with_options, write_stdout
+from xosc_lateral.cli.words import Options, Written, command, pairs, with_options, write_stdout
 from xosc_lateral.extras.recordings.importers import GROUP, IMPORTERS, find_importer
 
 
@@ -27,26 +27,16 @@ class _Table(Written):
     def fill(self, name: str, sources: Path | Sequence[Path], **options: Any) -> None:
         """Read recordings of a format, write them as a table, and say what they are."""
         from xosc_lateral import import_drives
-        from xosc_lateral.files.output_tables import harmless_frame
 
         files = [sources] if isinstance(sources, Path) else sources
         (table,) = self.claim(files, table=(self.output, "drives.parquet"))
         imported = import_drives(name, sources, **options)
         if table is None:
-            write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
+            write_stdout(imported.csv())
             self.say_words(str(imported), None)
         else:
             written = imported.write(self.output, force=self.force)
             self.say_words(str(imported), {"output": str(written), **imported.to_dict()})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _CutTable(_Table):
-    """The same of formats from which lane changes and the like are cut."""
-
-    keep_cut: Annotated[
-        bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
-    ] = False
 
 
 class _WithPlugins(TyperGroup):
@@ -91,16 +81,16 @@ def _add(
     kind: Any = list[Path] if metavar.endswith("...") else Path
 
     def run(sources: Any, *, options: Options, table: _Table) -> None:
-        if name == "mf4" and not options.keys() & {"channels", "mapping"}:
+        if name == "mf4" and not options["columns"].columns:
             from xosc_lateral.extras.recordings.importers.mf4 import channels_wanted
 
             raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-        table.fill(name, sources, **options, **({"keep_cut": table.keep_cut} if isinstance(table, _CutTable) else {}))
+        table.fill(name, sources, **options)
 
     run.__doc__ = str(importer.__doc__).partition("\n\n")[0]
     argument = typer.Argument(metavar=metavar, help=sources, show_default=False)
-    run.__annotations__ = {"sources": Annotated[kind, argument], "options": Annotated[Options, importer]}
-    run.__annotations__["table"] = _Table if name in ("mf4", "fcd") else _CutTable
+    annotations = {"sources": Annotated[kind, argument], "options": Annotated[Options, importer], "table": _Table}
+    run.__annotations__ = annotations
     command(group, name, short, *examples)(run)
 
 
@@ -134,32 +124,8 @@ _add(
     "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv",
     sources="Traces (.mcap, .osi).", metavar="TRACE...",
 )
-
-
-@command(
-    group, "table", "Tables of drives under other names.",
-    "import table --propose monday.csv > company.toml", "import table *.csv --mapping company.toml -o drives.parquet",
+_add(
+    "table", "Tables of drives under other names.",
+    "import table *.csv --mapping company.toml -o drives.parquet",
+    sources="Tables of drives.", metavar="TABLE...",
 )
-def table_(
-    sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
-    *,
-    output: Annotated[str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table, or - .")] = "-",
-    mapped: Mapped,
-    propose: Annotated[bool, typer.Option("--propose",
-        help="Write the first version of a mapping of these tables, with comments.")] = False,
-    reply: Written,
-) -> None:
-    """Tables of drives under a company's own names, units and words, by a saved mapping."""
-    if not propose:
-        table = _Table(output=output, quiet=reply.quiet, as_json=reply.as_json, force=reply.force)
-        table.fill("table", sources, mapping=mapped.mapping())
-        return
-    from xosc_lateral.files.atomic import write_atomically
-    from xosc_lateral.files.recognised import propose_mapping
-
-    text = propose_mapping(sources)
-    (path,) = reply.claim(sources, mapping=(output, "mapping.toml"))
-    if path is None:
-        write_stdout(text)
-    else:
-        write_atomically(path, text)

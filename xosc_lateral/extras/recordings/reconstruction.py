@@ -89,7 +89,7 @@ class Reconstruction(Result):
         outputs = [str(path) for path in self.outputs]
         return facts_of(self) | {"outputs": outputs, "messages": self.message_records()}
 
-    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:  # type: ignore[override]
         """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
 
         Returns

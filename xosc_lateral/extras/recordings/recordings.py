@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import FormatError, absent
 from xosc_lateral.base.texts import composed
-from xosc_lateral.drivers.drives.evidence import of_registration
-from xosc_lateral.extras.recordings.cuts import require_along_lanes
+from xosc_lateral.extras.recordings.cuts import require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
 from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
-from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
-from xosc_lateral.extras.recordings.importers.tracks import LaneShape
+from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
+from xosc_lateral.extras.recordings.importers.tracks import LaneShape, place_on_road
 from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
 from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
@@ -37,7 +36,6 @@ REAR_AXLE = 0.3  # middle of a vehicle ahead of its rear axle, as a share of its
 GATE_ROWS = 20_000  # so many rows tell whether a recording drives along its lanes [-]
 MAXIMUM_LENGTH = 60.0  # of vehicles with all that they pull: road trains have 53.5 m [m]
 MAXIMUM_WIDTH = 6.0  # of what drives on roads, heavy transports included [m]
-ROAD_MARGIN = 50.0  # a made road goes on so far beyond its traffic [m]
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
 """Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
 USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
@@ -109,7 +107,7 @@ def _composed(track: RecordedTrack) -> RecordedTrack:
 def drives_of(source: Path, road: Path, columns: MappingLike | None = None) -> ImportedDrives:
     """The drives of a recording on a road."""
     kind = format_of(source)
-    return import_drives(kind, source, road=road, **({"mapping": columns} if kind == "tracks" else {}))
+    return import_drives(kind, source, road=road, **({"columns": columns} if kind == "tracks" else {}))
 
 
 def format_of(source: Path) -> str:
@@ -128,7 +126,7 @@ def format_of(source: Path) -> str:
 
 # ---- tracks on a known road, or on the recording's own lanes ---------------------------------------------------------
 def _tracks(source: Path, road: Path | None, columns: TableMapping, wanted: str | None = None) -> list[RecordedTraffic]:
-    every = read_tracks(source, mapping=columns).of_recording(wanted, source)
+    every = read_tracks(source, columns).of_recording(wanted, source)
     return [_on_road(tracks, source, road) for tracks in every]
 
 
@@ -137,10 +135,8 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     from xosc_lateral.extras.recordings.osi_trace import read_osi
 
     recorded = read_osi(source)
-    made = recorded.opendrive
-    if road is None and made is None and (lanes := lanes_of(recorded)) is not None:
-        made = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
-    traffic = _on_road(recorded.tracks, source, road, made)
+    lanes = lanes_of(recorded) if road is None and recorded.opendrive is None else None
+    traffic = _on_road(recorded.tracks, source, road, recorded.opendrive, lanes=lanes)
     host = recorded.hosts[0] if len(recorded.hosts) == 1 else None
     return replace(traffic, notes=(*recorded.notes, *traffic.notes), host=host)
 
@@ -150,8 +146,7 @@ def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> Recor
 
     tracks, shapes, graph, _ = read_obstacles(source, source.stem)
     names = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
-    made = None if road is not None else roads_of_lanes(driven_lanes(shapes, graph), name_of(source)).encode()
-    return _on_road(replace(tracks, names=names), source, road, made)
+    return _on_road(replace(tracks, names=names), source, road, lanes=(shapes, graph))
 
 
 def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -175,8 +170,13 @@ def name_of(source: Path) -> str:
     return source.name.split(".")[0]
 
 
-def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None) -> RecordedTraffic:
-    """`made`: OpenDRIVE of the recording's own lanes, for where no road is given."""
+def _on_road(
+    tracks: Tracks, source: Path, road: Path | None, made: bytes | None = None, *,
+    lanes: tuple[Sequence[LaneShape], LaneGraph] | None = None,
+) -> RecordedTraffic:  # fmt: skip
+    """`made`: OpenDRIVE of the recording's own lanes, or these, for where no road is given."""
+    if made is None and road is None and lanes is not None:
+        made = roads_of_lanes(driven_lanes(*lanes), name_of(source)).encode()
     if road is not None:
         network, data, road_name = read_opendrive(road), read_source(road).data, road.name
     elif made is not None:
@@ -185,9 +185,8 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
-    every = slice(None, None, max(1, len(x) // GATE_ROWS))
-    place = require_along_lanes(network, x[every], y[every], heading[every], tracks.speed[every], source)
-    shift = of_registration(*place, tracks.vehicle[every], heading[every])
+    placed, _ = place_on_road(tracks.rows(np.arange(0, len(x), max(1, len(x) // GATE_ROWS))), network)
+    require_lane_direction(placed.agreement, placed.tracks.speed, Path(network.path).name or "its lanes", source)
     vehicles, notes = _vehicles(replace(tracks, x=x, y=y, heading=heading))
     sources = (source,) if road is None else (source, road)
     label = tracks.recordings[0] if len(tracks.recordings) == 1 else ""
@@ -198,7 +197,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, made: bytes | None
         data,
         road_name,
         sources,
-        (*tracks.notes, *notes, *([shift] if shift else [])),
+        (*placed.notes(), *notes),
         host=None,
         label=label,
         dropped=tracks.dropped,
@@ -279,31 +278,10 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
-    table, meta, rate = recording.tracks, recording.meta, recording.frame_rate
-    if "xCenter" in table.columns:  # exiD, inD, rounD, uniD
-        kinds = recording.classes(meta.set_index("trackId").reindex(table["trackId"]))
-        named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
-        return _on_road(tracks_of(named, files[0], (), columns), files[0], road)
-    recording.require(levelx.HIGHD_COLUMNS)
-    lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
-    table = recording.identified("id", "x", "y")
-    meta = meta.set_index("id").loc[table["id"]]
-    kind = recording.classes(meta)
-    is_ahead = meta["drivingDirection"].to_numpy() == 2
-    time, length, width = table["frame"].to_numpy(dtype=np.float64) / rate, table["width"], table["height"]
-    x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
-    place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(table["xVelocity"].to_numpy())
-    when = tuple(table["name"].unique()), table["vehicle"].to_numpy(), time, 1.0 / rate
-    tracks = Tracks(*when, *place, speed, length.to_numpy(), kind, width.to_numpy(), dropped=recording.dropped)
-    middle = 0.5 * (upper[-1] + lower[0])
-    sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
-    left, right = (
-        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]
-        for inner, widths in sides
-    )
-    x0 = float(np.floor(table["x"].min() - ROAD_MARGIN))
-    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + ROAD_MARGIN)) - x0]])
-    return _made(WrittenRoad(f"highd-{recording.number}", plan, left, right), tracks, files[0])
+    if not recording.is_highd:
+        return _on_road(levelx.tracks_in(recording), files[0], road)
+    made, tracks, _ = levelx.on_its_road(recording)
+    return _made(made, tracks, files[0])
 
 
 def _short(names: NDArray[np.str_]) -> dict[str, str]:

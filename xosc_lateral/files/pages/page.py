@@ -113,6 +113,10 @@ class Page:
         """Add paragraphs."""
         self._main += [f"<p>{inline(text)}</p>" for text in paragraphs if text]
 
+    def code(self, text: str) -> None:
+        """Add a text to copy, as it is."""
+        self._main.append(f"<pre>{escape(text)}</pre>")
+
     def items(self, lines: Iterable[str]) -> None:
         """Add a list; nothing if it is empty."""
         points = _points(lines)

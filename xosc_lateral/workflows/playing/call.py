@@ -172,14 +172,10 @@ class Playback(Result):
 
         return states_csv(self._played.motion, self._played.network)
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        from xosc_lateral.files.output_tables import output_suffixes, write_table
-
-        output = output_file(path, f"{self.scenario.stem}.csv", output_suffixes())
-        claim([output], self.files, force=force)
-        write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
-        return output
+    @property
+    def usual_table(self) -> str:
+        """Called after the scenario."""
+        return f"{self.scenario.stem}.csv"
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""

@@ -17,6 +17,7 @@ from xosc_lateral.base.errors import DriverProfileError, FormatError, NotEnoughD
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, rows_left_out, warnings
 from xosc_lateral.base.texts import counted
+from xosc_lateral.drivers.drives.cleaning import summary_of
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
 from xosc_lateral.files.recognised import mapping_text, recognised
@@ -27,6 +28,7 @@ from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, given_d
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.files.pages.figure import Figure
 
 BESIDE = ("left_distance", "right_distance")
 
@@ -118,16 +120,13 @@ class Health(Result):
         """Numbers of all drives together; empty where they can't be read."""
         if self.read is None:
             return {}
-        drives = self.read.drives
-        offset = np.concatenate([drive.offset for drive in drives])
-        rows = self.drives
+        rows, all_of = self.drives, summary_of(self.read.drives, {})
         return {
-            "drives": len(drives), "hours": sum(row["minutes"] for row in rows) / 60.0,
+            "drives": len(rows), "hours": sum(row["minutes"] for row in rows) / 60.0,
             "road_following_h": sum(row["road-following [min]"] for row in rows) / 60.0,
-            "rows": len(offset), "left_out": dict(self.read.left_out),
+            "rows": sum(row["rows"] for row in rows), "left_out": dict(self.read.left_out),
             "rate_hz": float(np.median([row["rate [Hz]"] for row in rows])),
-            "offset_mean_m": float(offset.mean()), "offset_sd_m": float(offset.std()),
-            "lane_width_m": float(np.median(np.concatenate([drive.lane_width for drive in drives]))),
+            **{name: all_of[name] for name in ("offset_mean_m", "offset_sd_m", "lane_width_m")},
         }  # fmt: skip
 
     def headline(self) -> str:
@@ -211,6 +210,12 @@ class Health(Result):
             "summary": self.figures, "drives": self.drives, "sensor": self.sensor,
             "can": self.can(), "cannot": self.cannot(), "messages": self.message_records(), "mapping": self.mapping,
         }  # fmt: skip
+
+    def plot(self) -> Figure | None:
+        """Offsets of the first drives; None: nothing can be read."""
+        from xosc_lateral.workflows.profiles.health_page import traces
+
+        return None if self.read is None else traces(self.read.drives)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page."""

@@ -15,6 +15,7 @@ from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.files.source import parsed_hashes
 
 BINS = 80
+SHOWN_DRIVES, SHOWN_TIME = 4, 300.0  # traces, and how much of each [s]
 NAMED_DRIVES = 50  # so many drives have a row of their own
 
 
@@ -39,11 +40,7 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
     if facts["sensor"]:
         page.text(f"{facts['sensor']}.")
     if known:
-        page.figure(
-            _offsets(drives),
-            "How the offsets lie in the lane, the markings at its edges; all rows that are read.",
-            "Histogram of the offsets between the lane markings",
-        )
+        page.figure(histograms(drives), "All rows that are read.", "Histograms of offset, lane width and speed")
     cannot = [*facts["cannot"], *(one["what"] for one in facts["messages"] if one["severity"] == "warning")]
     if cannot:
         page.section("What can't be fitted, and what is in doubt")
@@ -53,6 +50,8 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
     if facts["others"]:
         page.text(f"Others, which are context under their own names: {', '.join(facts['others'])}.")
     if known:
+        page.section("Traces")
+        page.figure(traces(drives), f"Offsets of the first drives, at most {SHOWN_TIME:g} s of each.")
         page.section("Drives", folded=True)
         rows = (
             sorted(facts["drives"], key=lambda row: -row["minutes"]) if len(drives) > NAMED_DRIVES else facts["drives"]
@@ -70,16 +69,30 @@ def page_of(headline: str, facts: Mapping[str, Any], drives: Sequence[Drive]) ->
         "Read every line, correct it, and give the file with `--mapping`; `check` writes it with `--write-mapping`.",
         folded=True,
     )
-    page.items(f"`{line}`" for line in facts["mapping"].splitlines() if line)
+    page.code(facts["mapping"])
     return page.html({"inputs": parsed_hashes(files)})
 
 
-def _offsets(drives: Sequence[Drive]) -> Figure:
-    figure = Figure(1, 1, height=130.0)
-    (panel,) = figure.panels
-    offset = np.concatenate([drive.offset for drive in drives])
-    half = 0.5 * float(np.median(np.concatenate([drive.lane_width for drive in drives])))
-    density, edges = np.histogram(offset, np.linspace(-half, half, BINS + 1), density=True)
-    panel.steps(edges, density, MEASURED)
-    panel.x.label, panel.y.label = "offset, left of the lane's centre is positive [m]", "density [1/m]"
+def histograms(drives: Sequence[Drive]) -> Figure:
+    """Offset, lane width and speed of all rows, as far as they are known."""
+    speed = [drive.speed[np.isfinite(drive.speed)] for drive in drives if drive.speed is not None]
+    columns = {"offset, positive left [m]": [drive.offset for drive in drives],
+               "lane width [m]": [drive.lane_width for drive in drives], "speed [m/s]": speed}  # fmt: skip
+    shown = {label: np.concatenate(parts) for label, parts in columns.items() if sum(map(len, parts))}
+    figure = Figure(1, len(shown), height=130.0)
+    for panel, (label, values) in zip(figure.panels, shown.items(), strict=True):
+        panel.steps(*np.histogram(values, BINS, density=True)[::-1], MEASURED)
+        panel.x.label = label
+    figure.panels[0].y.label = "density"
+    return figure
+
+
+def traces(drives: Sequence[Drive]) -> Figure:
+    """Offsets of the first drives as they begin."""
+    figure = Figure(max(1, len(drives[:SHOWN_DRIVES])), height=75.0)
+    for panel, drive in zip(figure.panels, drives, strict=False):
+        rows = slice(int(np.searchsorted(drive.time, drive.time[0] + SHOWN_TIME)))
+        panel.level()
+        panel.line(drive.time[rows], drive.offset[rows], MEASURED)
+        panel.title, panel.x.label, panel.y.label = drive.name, "time [s]", "offset [m]"
     return figure

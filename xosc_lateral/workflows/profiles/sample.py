@@ -22,14 +22,12 @@ from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
     GivenDrives,
-    PathLike,
     Paths,
     ProfileLike,
     Result,
     given_drives,
     given_profile,
     naming,
-    write_table,
 )
 
 if TYPE_CHECKING:
@@ -203,17 +201,15 @@ class Offsets(Result):
             panel.title, panel.x.label, panel.y.label = drive.drive, "time [s]", "offset [m]"
         return figure
 
-    def csv(self) -> str:
-        """The table as text."""
-        from xosc_lateral.files.output_tables import csv_text
+    @property
+    def usual_table(self) -> str:
+        """Called after the profile."""
+        return f"{self.profile.name}.csv"
 
-        return csv_text(self.to_frame())
-
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        files = () if self._tables is None else self._tables.files
-        name = f"{self.profile.name}.csv"
-        return write_table(path, name, self.to_frame, self._provenance, inputs=files, force=force)
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Tables that were read."""
+        return () if self._tables is None else self._tables.files
 
     def _provenance(self) -> dict[str, Any]:
         from xosc_lateral.files.profiles import profile_hash

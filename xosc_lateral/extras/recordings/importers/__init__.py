@@ -29,13 +29,13 @@ from xosc_lateral.drivers.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.drivers.model.plausibility import implausible_rows
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.files.drives import file_label, file_labels
-from xosc_lateral.files.output_paths import claim, output_file
-from xosc_lateral.files.output_tables import harmless_frame, output_suffixes, write_table
+from xosc_lateral.files.mapping import as_mapping
+from xosc_lateral.files.output_tables import harmless_frame
 from xosc_lateral.files.source import parsed_hash
 from xosc_lateral.files.tables import foreign_errors
 from xosc_lateral.workflows.opened import opened, opened_as_one
-from xosc_lateral.workflows.options import declare_options
-from xosc_lateral.workflows.result import PathLike, Paths, Result
+from xosc_lateral.workflows.options import declare_options, flag
+from xosc_lateral.workflows.result import Paths, Result
 
 Importer: TypeAlias = "Callable[..., ImportedDrives | pd.DataFrame]"
 """A source's path, and options by name, into a drive table, or into an `ImportedDrives` with a record of its own."""
@@ -91,7 +91,12 @@ def import_drives(
     FormatError
         An unknown format, or a source that can't be read.
     """
-    sources = (opened_as_one(source, options.get("mapping")),) if format == "tracks" else tuple(opened(source, "table"))
+    former = [options.pop(word) for word in ("mapping", "channels") if format in IMPORTERS and word in options]
+    if former:  # words of before, of one meaning today
+        every = [*map(as_mapping, (*former, options.get("columns")))]
+        columns = {name: one for known in every for name, one in known.columns.items()}
+        options["columns"] = replace(every[0], columns=columns)
+    sources = (opened_as_one(source, options.get("columns")),) if format == "tracks" else tuple(opened(source, "table"))
     if not sources:
         raise ValueError("no source to import")
     if options.get("road") is not None:
@@ -111,7 +116,7 @@ def _known_options(read: Callable[..., object], format: str, options: Mapping[st
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in known):
         return dict(options)
     kinds, known_values = {parameter.name: parameter.annotation for parameter in known}, {}
-    kinds |= {"keep_cut": bool} if getattr(read, "can_keep_cut", False) else {}
+    kinds |= {"keep_cut": bool} if "keep_cut" in getattr(read, "__options__", {}) else {}
     for name, value in options.items():
         if name not in kinds:
             raise FormatError(f"importer {format!r} has no setting {name!r}; there are {', '.join(kinds) or 'none'}")
@@ -173,13 +178,22 @@ class ImportedDrives(Result):
         """Plain values, as ``--json`` prints them: the provenance."""
         return asdict(self.provenance) | {"messages": self.message_records()}
 
-    def write(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance, whole or not at all."""
-        output = output_file(path, f"{file_label(self.sources[0])}.parquet", output_suffixes())
-        claim([output], [source for source in self.sources if source.is_file()], force=force)
-        text = lambda: harmless_frame(self.table).to_csv(index=False, lineterminator="\n")  # noqa: E731
-        write_table(output, asdict(self.provenance), frame=lambda: self.table, text=text)
-        return output
+    def csv(self) -> str:
+        """The table as text, every digit of it."""
+        return str(harmless_frame(self.table).to_csv(index=False, lineterminator="\n"))
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """That were read."""
+        return tuple(source for source in self.sources if source.is_file())
+
+    @property
+    def usual_table(self) -> str:
+        """Called after the first source."""
+        return f"{file_label(self.sources[0])}.parquet"
+
+    def _provenance(self) -> dict[str, Any]:
+        return asdict(self.provenance)
 
 
 # ---- what importers make ---------------------------------------------------------------------------------------------
@@ -229,6 +243,10 @@ def import_each(files: Sequence[Path], read: Callable[[Path, str], ImportedDrive
     return ImportedDrives(pd.concat([part.table for part in parts], ignore_index=True), record)
 
 
+KEEP_CUT = flag("--keep-cut", kind=bool | None,
+    help="Keep rows that would be cut; the column `state` gives the reason.")  # fmt: skip
+
+
 def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrives]:
     """Options that annotations declare; without the rows that are cut, unless they are kept (`keep_cut`).
 
@@ -253,7 +271,7 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
             _refuse_nonsense(kept, path)
         return ImportedDrives(kept, record)
 
-    within.can_keep_cut = True  # type: ignore[attr-defined]
+    within.__options__["keep_cut"] = KEEP_CUT  # type: ignore[attr-defined]
     return within
 
 

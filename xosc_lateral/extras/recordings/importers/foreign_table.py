@@ -14,21 +14,25 @@ from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, paths_of
 from xosc_lateral.files.drives import drives_of_table, file_labels, labels_apart, rows_of_drives, translated
-from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
+from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.tables import read_table, tables_at
+from xosc_lateral.workflows.options import declare_options
 
 
-def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> ImportedDrives:
-    """Tables under standard names and units; a drive is called after its file, its label and how often its clock began
+@declare_options
+def import_table(sources: Path | Sequence[Path], *, columns: MappingLike | None = None) -> ImportedDrives:
+    """Tables of drives under a company's own names, units and words, by a saved mapping.
+
+    A drive is called after its file, its label and how often its clock began
     again. All rows that are chosen are in the table; the record says which of them are in no drive, and why.
     """
-    known, files = as_mapping(mapping), [table for path in paths_of(sources) for table in tables_at(path)]
+    known, files = as_mapping(columns), [table for path in paths_of(sources) for table in tables_at(path)]
     made, lost, drives = list[pd.DataFrame](), Counter[str](), list[Drive]()
     for path, label in zip(files, file_labels(files), strict=True):
         read = read_table(path, known)
         table = translated(read, known, path)
         lost["not chosen"] += len(read) - len(table)
-        drives += drives_of_table(table, TableMapping(), path, lost)
+        drives += drives_of_table(table, known, path, lost, is_translated=True)
         names = np.empty(len(table), dtype=object)
         for name, rows in rows_of_drives(table, path, label):
             names[rows] = name

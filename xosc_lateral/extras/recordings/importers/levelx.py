@@ -1,4 +1,4 @@
-"""HighD and exiD (leveLXData, RWTH Aachen) into the standard drive table, from their published column layouts.
+"""HighD, exiD, inD, rounD and uniD (leveLXData, RWTH Aachen) into the standard drive table, from published layouts.
 
 A recording is three files, ``XX_tracks.csv``, ``XX_tracksMeta.csv`` and ``XX_recordingMeta.csv``.
 
@@ -10,6 +10,8 @@ exiD [2]_ : lateral offset and lane width come along with every row (`latLaneCen
 parted by ``;`` where lanelets overlap: the first one counts). Which side is positive there is found from the data, by
 comparing the offset's rate with the heading, so that `offset` is positive to the left whatever the release says.
 
+inD, rounD, uniD: places alone; lanes are those of the road that comes beside them.
+
 References
 ----------
 .. [1] R. Krajewski et al., ITSC 2018, doi:10.1109/ITSC.2018.8569552
@@ -20,8 +22,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,15 +37,27 @@ from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.identity import identify
 from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
+from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of
+from xosc_lateral.extras.recordings.importers.tracks import (
+    PlacedTracks,
+    drive_table,
+    mostly_beside,
+    place_on_road,
+    require_lanes,
+)
 from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE
-from xosc_lateral.extras.recordings.neighbours import find_neighbours
-from xosc_lateral.files.mapping import classes_of
+from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad
+from xosc_lateral.files.mapping import TableMapping, classes_of
+from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
 from xosc_lateral.files.tables import read_table
+from xosc_lateral.workflows.options import flag
+from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = (
     "highD/exiD: leveLXData, under the licence that you signed (free for non-commercial research); whether fitted "
     "parameters may be passed on is for that licence to say"
 )
+ROAD_MARGIN = 50.0  # highD's road goes on so far beyond its traffic [m]
 HIGHD_COLUMNS = ("frame", "id", "x", "y", "width", "height", "xVelocity", "xAcceleration")
 EXID_COLUMNS = (
     *("trackId", "frame", "xCenter", "yCenter", "heading", "length", "lonVelocity", "lonAcceleration"),
@@ -52,22 +67,38 @@ EXID_COLUMNS = (
 
 
 @importer
-def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS) -> ImportedDrives:
-    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
+def import_levelx(
+    source: Path,
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    road: Annotated[Path | None, flag("--road", kind=Path | None, metavar="FILE.xodr",
+        help="Road of inD, rounD or uniD; exiD's rows lie in its lanes instead of in those that they name.")] = None,
+) -> ImportedDrives:  # fmt: skip
+    """Recordings of highD, exiD, inD, rounD, uniD: a folder, or one XX_tracks.csv with its two meta files beside it."""
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
-    parts, layouts, steps, dropped = [], set[str](), set[float](), Counter[str]()
+    network = None if road is None else read_opendrive(road)
+    parts, layouts, steps, dropped, notes = [], set[str](), set[float](), Counter[str](), list[str]()
     for path in files:
         recording = Recording.read(path)
-        layouts.add("exiD" if recording.is_exid else "highD")
+        layout = "highD" if recording.is_highd else "exiD" if recording.is_exid else "inD"
+        if layout == "exiD" and network is None:
+            table, lost = _from_exid(recording, settings), recording.dropped
+        else:
+            table, placed = _in_lanes(recording, network, settings, f"{layout.lower()}-{recording.number}-")
+            lost = Counter(placed.tracks.dropped)
+            notes += [*placed.notes(), *(mostly_beside(placed) if layout != "highD" else [])]
+        layouts.add(layout)
         steps.add(1.0 / recording.frame_rate)
-        parts.append((_from_exid if recording.is_exid else _from_highd)(recording, settings))
-        dropped += recording.dropped
+        parts.append(table)
+        dropped += lost
     if len(layouts) > 1 or len(steps) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
     about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings), "dropped": dropped}
-    return imported(pd.concat(parts, ignore_index=True), sources=files, step=steps.pop(), **about)
+    sources = files if road is None else [*files, Path(road)]
+    table = pd.concat(parts, ignore_index=True)
+    return imported(table, sources=sources, step=steps.pop(), notes=tuple(notes), **about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +131,13 @@ class Recording:
         return self.path.name.split("_")[0]
 
     @property
+    def is_highd(self) -> bool:
+        """Else its vehicles have middles."""
+        return "xCenter" not in self.tracks.columns
+
+    @property
     def is_exid(self) -> bool:
-        """Else it is of highD."""
+        """Whether rows say where in their lane they are."""
         return "latLaneCenterOffset" in self.tracks.columns
 
     @property
@@ -144,46 +180,62 @@ class Recording:
             )
 
 
-def _from_highd(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+def on_its_road(recording: Recording) -> tuple[WrittenRoad, Tracks, FloatArray]:
+    """highD's road, which is straight and has its markings in the meta file, its tracks, and their acceleration."""
     recording.require(HIGHD_COLUMNS)
-    step, tracks = 1.0 / recording.frame_rate, recording.identified("id", "x", "y")
-    meta = recording.meta.set_index("id").reindex(tracks["id"])
-    rightwards = meta["drivingDirection"].to_numpy() == 2
-    way = np.where(rightwards, 1.0, -1.0)
-    velocity = tracks["xVelocity"].to_numpy(dtype=np.float64)
+    lower, upper = (np.sort(recording.markings(side)) for side in ("lower", "upper"))
+    table = recording.identified("id", "x", "y")
+    meta = recording.meta.set_index("id").reindex(table["id"])
+    is_ahead = meta["drivingDirection"].to_numpy() == 2
+    way, velocity = np.where(is_ahead, 1.0, -1.0), table["xVelocity"].to_numpy(dtype=np.float64)
     where = "the recording's drivingDirection"
     require_lane_direction(way * np.sign(velocity), np.abs(velocity), where, recording.path)
-    # y points down: for traffic towards +x the left is at smaller y.
-    x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
-    left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
-    lane, offset, width, count = (np.zeros(len(tracks)) for _ in range(4))
-    for mine, side, sign in ((rightwards, "lower", -1.0), (~rightwards, "upper", 1.0)):
-        marks = np.sort(sign * recording.markings(side))
-        index = np.searchsorted(marks, left[mine]) - 1
-        inside = np.clip(index, 0, len(marks) - 2)
-        lane[mine] = np.where(index == inside, index, -1)
-        offset[mine] = left[mine] - 0.5 * (marks[inside] + marks[inside + 1])
-        width[mine], count[mine] = np.diff(marks)[inside], len(marks) - 1
-    lane_number, frame = lane.astype(np.int64), tracks["frame"].to_numpy()
-    kind = recording.classes(meta)
-    is_truck, instant, length = np.isin(kind, list(TRUCKS)), frame * 2 + rightwards, tracks["width"].to_numpy()
-    on_left, on_right = lane_number < count - 1, lane_number > 0
-    near = find_neighbours(instant, lane_number, x, length, is_truck, lane_on_left=on_left, lane_on_right=on_right)
-    columns = {
-        "drive": f"highd-{recording.number}-" + tracks["name"],
-        "time": np.round(frame * step, 4),
-        "offset": offset,
-        "lane_width": width,
-        "speed": np.abs(tracks["xVelocity"].to_numpy()),
-        "acceleration": way * tracks["xAcceleration"].to_numpy(),
-        "lane_index": lane_number,
-        "lane_count": count.astype(np.int64),
-        **near,
-    }
-    return cut_table(
-        columns, settings, vehicle=tracks["vehicle"].to_numpy(), time=frame * step, lane=lane_number, step=step,
-        sideways=left, reasons={"no lane": lane_number < 0}, kind=kind, is_truck=is_truck,
-    )  # fmt: skip
+    time, length, width = table["frame"].to_numpy(np.float64) / recording.frame_rate, table["width"], table["height"]
+    x, y = (table["x"] + 0.5 * length).to_numpy(), -(table["y"] + 0.5 * width).to_numpy()  # y points down there
+    place, speed = (x, y, np.where(is_ahead, 0.0, np.pi)), np.abs(velocity)
+    when = tuple(table["name"].unique()), table["vehicle"].to_numpy(), time, 1.0 / recording.frame_rate
+    kinds = recording.classes(meta)
+    tracks = Tracks(*when, *place, speed, length.to_numpy(), kinds, width.to_numpy(), dropped=recording.dropped)
+    middle = 0.5 * (upper[-1] + lower[0])
+    sides = ((middle - float(upper[-1]), np.diff(upper)[::-1]), (float(lower[0]) - middle, np.diff(lower)))
+    left, right = (
+        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(width)) for width in widths)]
+        for inner, widths in sides
+    )
+    x0 = float(np.floor(table["x"].min() - ROAD_MARGIN))
+    plan = np.array([[0.0, x0, -middle, 0.0, float(np.ceil((table["x"].max() + length.max()) + ROAD_MARGIN)) - x0]])
+    return (
+        WrittenRoad(f"highd-{recording.number}", plan, left, right),
+        tracks,
+        way * table["xAcceleration"].to_numpy(),
+    )
+
+
+def tracks_in(recording: Recording) -> Tracks:
+    """Tracks of a recording whose road comes beside it, in the road's coordinates."""
+    table = recording.tracks
+    kinds = recording.classes(recording.meta.set_index("trackId").reindex(table["trackId"]))
+    clock = table["frame"] / recording.frame_rate
+    named = table.assign(time=clock, heading=np.radians(table["heading"]), vehicle_class=kinds)
+    return tracks_of(named, recording.path, TableMapping())
+
+
+def _in_lanes(
+    recording: Recording, network: RoadNetwork | None, settings: CutSettings, prefix: str
+) -> tuple[pd.DataFrame, PlacedTracks]:
+    """The drive table of a recording on a road."""
+    if recording.is_highd:
+        made, tracks, acceleration = on_its_road(recording)
+        placed, graph = place_on_road(tracks, parse_opendrive(made.to_xml().encode(), made.name))
+        placed = replace(placed, road={name: placed.road[name] for name in ("lane_index", "lane_count")})
+        table = drive_table(placed, graph, settings).assign(acceleration=acceleration)
+    elif network is None:
+        raise FormatError("comes without lanes: give its road with --road FILE.xodr", path=recording.path)
+    else:
+        placed, graph = place_on_road(tracks_in(recording), network)
+        require_lanes(placed, Path(network.path).name, recording.path)
+        table = drive_table(placed, graph, settings)
+    return table.assign(drive=prefix + table["drive"]), placed
 
 
 def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:

@@ -42,10 +42,10 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, i
 from xosc_lateral.files.apart import apart
 from xosc_lateral.files.columns import refuse_marker
 from xosc_lateral.files.drives import file_labels, from_middle
-from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
+from xosc_lateral.files.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, spelled
 from xosc_lateral.files.source import Source, open_source
 from xosc_lateral.files.tables import LONGEST_MESSAGE, foreign_errors
-from xosc_lateral.workflows.options import MAPPING, flag
+from xosc_lateral.workflows.options import flag
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
@@ -100,9 +100,7 @@ class Channel:
 @importer
 def import_mf4(
     sources: Path | Sequence[Path],
-    channels: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=CHANNEL[:UNIT]",
-        help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.")] = (), *,
-    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    columns: MappingLike | None = None, *,
     step: Annotated[float, flag(help="Time step of the table, to which channels are interpolated [s].", min=0.001,
         max=1)] = 0.04,
 ) -> ImportedDrives:  # fmt: skip
@@ -111,8 +109,8 @@ def import_mf4(
     Mapped channels are read at an even step, over the time that all position channels of a log cover. Each log is a
     drive called after its file. Messages that stay away for longer than `fit` bridges leave a gap.
     """
-    files, saved = paths_of(sources), as_mapping(mapping)
-    wanted = {**saved.columns, **parse_map(channels)}
+    files, saved = paths_of(sources), as_mapping(columns)
+    wanted = saved.columns
     if not any(set(pair) <= wanted.keys() for pair in POSITIONS):
         raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(wanted) or 'nothing'}", path=files[0])
     tables, notes = list[pd.DataFrame](), list[str]()
@@ -129,7 +127,7 @@ def import_mf4(
             if share < 1.0 and name not in POSITIONS[0] + POSITIONS[1]:
                 notes.append(f"{table['drive'].iloc[0]}: {name} is known in {100 * share:.0f} % of the time")
     every_unit = {name: " | ".join(sorted(words)) for name, words in units.items()}
-    settings = {"step": step, "channels": list(channels), "units": every_unit}
+    settings = {"step": step, "channels": [f"{name}={one.column}" for name, one in wanted.items()], "units": every_unit}
     about = {"format": "mf4", "licence": LICENCE, "settings": settings, "notes": tuple(dict.fromkeys(notes))}
     return imported(pd.concat(tables, ignore_index=True), sources=files, step=step, **about)
 

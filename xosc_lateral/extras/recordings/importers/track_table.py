@@ -32,12 +32,12 @@ from xosc_lateral.files.columns import (
     seconds_of_stamps,
 )
 from xosc_lateral.files.mapping import (
+    COMPASS,
     UNITS,
     ColumnSource,
     MappingLike,
     TableMapping,
     as_mapping,
-    parse_map,
     standard_sources,
 )
 from xosc_lateral.files.output_tables import RECOGNISED_BY
@@ -51,12 +51,24 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     ),
     "vehicle": ("vehicle", "id", "track_id", "vehicle_id", "object_id", "agent_id", "car_id", "track", "drive"),
     "time": ("time", "timestamp", "t", "global_time", "timestamp_seconds", "sim_time"),
-    "x": ("x", "x_center", "center_x", "easting", "center_easting", "pos_x", "position_x", "car_center_x"),
-    "y": ("y", "y_center", "center_y", "northing", "center_northing", "pos_y", "position_y", "car_center_y"),
+    "x": ("x", "x_center", "center_x", "easting", "center_easting", "pos_x", "position_x", "car_center_x", "global_x"),
+    "y": (
+        "y",
+        "y_center",
+        "center_y",
+        "northing",
+        "center_northing",
+        "pos_y",
+        "position_y",
+        "car_center_y",
+        "global_y",
+    ),
     "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
-    "speed": ("speed", "velocity", "v"),
-    "length": ("length", "vehicle_length", "dimension_length"),
-    "width": ("width", "vehicle_width", "dimension_width"),
+    "speed": ("speed", "velocity", "v", "v_vel"),
+    "vx": ("vx", "velocity_x", "x_velocity"),
+    "vy": ("vy", "velocity_y", "y_velocity"),
+    "length": ("length", "vehicle_length", "dimension_length", "v_length"),
+    "width": ("width", "vehicle_width", "dimension_width", "v_width"),
     "rear": ("rear",),
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type", "vehicle_type", "object_category"),
 }
@@ -107,17 +119,20 @@ class Tracks:
             mine = np.flatnonzero(self.recording == number)
             if len(mine) and wanted in (None, label):
                 numbers, vehicle = np.unique(self.vehicle[mine], return_inverse=True)
-                arrays: dict[str, Any] = {
-                    name: values[mine] for name, values in vars(self).items()
-                    if isinstance(values, np.ndarray) and name not in ("vehicle", "recording")
-                }  # fmt: skip
                 names = tuple(self.names[k] for k in numbers.tolist())
-                made.append(replace(self, names=names, vehicle=vehicle, recording=None, recordings=(label,), **arrays))
+                alone = self.rows(mine)
+                made.append(replace(alone, names=names, vehicle=vehicle, recording=None, recordings=(label,)))
         return made
+
+    def rows(self, rows: IntArray) -> Tracks:
+        """Some rows, of vehicles of the same numbers."""
+        arrays: dict[str, Any] = {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+        return replace(self, **{name: values[rows] for name, values in arrays.items()})
 
 
 USUAL_SPEEDS = 5.0, 60.0  # of moving traffic in the median, towns to motorways [m/s]
 MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
+LEAST_FRAME_RATE, FRAME_RATE_AGREED = 5, 0.1  # slower, and 3.6, 3.28 or 2.24, are units of speed [1/s], [-]
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
@@ -127,25 +142,23 @@ def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray)
     return np.arctan2(vy, vx), np.hypot(vx, vy)
 
 
-def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
+def read_tracks(path: Path, columns: MappingLike | None = None) -> Tracks:
     """Read a table of tracks. `columns`: ``NAME=COLUMN[:UNIT]`` for other headers and units than usual."""
-    saved = as_mapping(mapping)
+    saved = as_mapping(columns)
     if path.is_dir():
-        return tracks_of(read_table(path, saved), path, columns, saved)
+        return tracks_of(read_table(path, saved), path, saved)
     with open_source(path) as source:
         is_log = unpacked_text(source).read(len(LOG_BEGINNING)) == LOG_BEGINNING
     # no name holds the table: it goes as soon as its columns are taken
-    return tracks_of(read_esmini_log(path) if is_log else read_table(path, saved), path, columns, saved, is_log=is_log)
+    return tracks_of(read_esmini_log(path) if is_log else read_table(path, saved), path, saved, is_log=is_log)
 
 
-def tracks_of(
-    table: pd.DataFrame, path: Path, columns: Sequence[str], saved: TableMapping, *, is_log: bool = False
-) -> Tracks:
+def tracks_of(table: pd.DataFrame, path: Path, saved: TableMapping, *, is_log: bool = False) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`. `is_log`: it is one of esmini, whose units are known."""
     is_played = set(map(str, table.columns)) >= set(RECOGNISED_BY)
     if is_played:  # its positions are those of reference points
         table = table.rename(columns={"name": "vehicle", "h": "heading"})
-    rows, lost = _columns(table, path, saved, columns)
+    rows, lost = _columns(table, path, saved)
     del table
     codes, labels = rows.pop("vehicle").factorize(sort=True)
     time = rows.pop("time").to_numpy()
@@ -163,6 +176,9 @@ def tracks_of(
             np.array(each)[number] for each in (list(words), [USUAL_LENGTH.get(word, 4.6) for word in words])
         )
     more: dict[str, Any] = {name: rows.pop(name).to_numpy() for name in list(rows.columns)}
+    velocity = more.pop("vx", None), more.pop("vy", None)  # along which axes, only their hypotenuse does not ask
+    if "speed" not in more and velocity[0] is not None and velocity[1] is not None:
+        more["speed"] = np.hypot(*velocity)
     if "length" in more:
         usual = np.where(np.isfinite(more["length"]), more["length"], usual)
     if "rear" in more:
@@ -207,7 +223,7 @@ def tracks_of_rows(
     speed = np.abs(speed)
     if not is_believed:
         require_headings(heading, way, driven, path)
-        _require_speed(speed, driven, path)
+        _require_speed(speed, driven, path, counts=bool((time == np.round(time)).all()))
         if wrong := evidence.of_sizes(columns["length"], columns.get("width")):
             raise FormatError(wrong, path=path, element="columns 'length', 'width'")
     clock, ahead = apart_in_time(time, known.recording, step), np.nan_to_num(columns.get("rear", np.zeros(len(x))))
@@ -223,7 +239,8 @@ def tracks_of_rows(
     return tracks, order
 
 
-def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
+def _require_speed(speed: FloatArray, driven: FloatArray, path: Path, *, counts: bool) -> None:
+    """Refuse speeds that are not those of x and y; `counts`: times are whole numbers. [m/s]"""
     moving = (np.maximum(driven, speed) > MOVING_SPEED) & (np.minimum(driven, speed) > 0.0)
     places = {f"x and y may be in {unit} (x=COLUMN:{unit}, y=COLUMN:{unit})": by
               for unit, by in (("ft", 0.3048), ("cm", 1e-2), ("mm", 1e-3))}  # fmt: skip
@@ -234,6 +251,9 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     ratio = float(np.median(speed[moving] / driven[moving])) if moving.any() else 1.0
     if 1.0 / MAX_SPEED_RATIO <= ratio <= MAX_SPEED_RATIO:
         return
+    if (frames := round(ratio)) >= LEAST_FRAME_RATE and abs(ratio / frames - 1.0) < FRAME_RATE_AGREED and counts:
+        what = f"speed is {ratio:.3g} times as fast as x and y move; time may count frames: time=COLUMN:1/{frames} s"
+        raise FormatError(what, path=path)
     factors = {"x and y may be in km (x=COLUMN:km, y=COLUMN:km), or time in ms": 1e3,
                "time may be in min: time=COLUMN:min": 1.0 / 60.0, **places}  # fmt: skip
     for cause, factor in factors.items():
@@ -246,11 +266,9 @@ def _require_speed(speed: FloatArray, driven: FloatArray, path: Path) -> None:
     raise FormatError(f"is {ratio:.3g} times as fast as x and y move; {cause}", path=path, element="column 'speed'")
 
 
-def _columns(
-    table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]
-) -> tuple[pd.DataFrame, dict[str, int]]:
+def _columns(table: pd.DataFrame, path: Path, saved: TableMapping) -> tuple[pd.DataFrame, dict[str, int]]:
     """Columns under their names, and the rows that are not in them by reason."""
-    mapping = {**saved.columns, **parse_map(words)}
+    mapping = dict(saved.columns)
     if "class" in mapping:
         mapping["vehicle_class"] = mapping.pop("class")
     if unknown := mapping.keys() - HEADERS.keys():
@@ -281,6 +299,7 @@ def _columns(
             if name == "time" and not pd.api.types.is_numeric_dtype(column):
                 stamps = seconds_of_stamps(column, path, saved.time_zone, columns["vehicle"])
             numbers = numbers_of(column, path, name) * source.factor if stamps is None else stamps
+            numbers += 0.5 * np.pi * (source.unit == COMPASS)
             numbers[np.isinf(numbers)] = np.nan
             columns[name] = pd.Series(numbers, index=column.index)
     every = pd.DataFrame(columns, copy=False)

@@ -38,7 +38,7 @@ from xosc_lateral.extras.recordings.lane_order import LaneGraph, RoadLanes
 from xosc_lateral.extras.recordings.neighbours import neighbour_columns
 from xosc_lateral.files.mapping import MappingLike
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.workflows.options import MAPPING, flag
+from xosc_lateral.workflows.options import flag
 from xosc_lateral.world.road.network import RoadNetwork
 
 LICENCE = "your own recording"
@@ -61,14 +61,17 @@ class PlacedTracks:
     road: Mapping[str, FloatArray] = field(default_factory=dict)  # columns that it has there: curvature, lane_index ...
     scale: FloatArray | float = 1.0  # metres along the lane per metre of `along` [-]
 
+    def notes(self) -> tuple[str, ...]:
+        """Those of the tracks, and whether they lie beside their lanes."""
+        shift = of_registration(self.offset, self.lane_width, self.tracks.vehicle, self.tracks.heading)
+        return (*self.tracks.notes, *([shift] if shift else []))
+
 
 @importer
 def import_tracks(
     source: Path, *,
     road: Annotated[Path | str, flag("--road", kind=Path, metavar="FILE.xodr", help="Road on which the tracks lie.")],
-    columns: Annotated[Sequence[str], flag("--map", kind=list[str] | None, metavar="NAME=COLUMN[:UNIT]",
-        help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.")] = (),
-    mapping: Annotated[MappingLike | None, MAPPING] = None,
+    columns: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
 ) -> ImportedDrives:  # fmt: skip
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours.
@@ -77,10 +80,10 @@ def import_tracks(
     middle, or lie `rear` behind it, in the road's coordinates.
     """
     network = read_opendrive(road)
-    placed, graph = place_on_road(read_tracks(source, columns, mapping), network)
+    placed, graph = place_on_road(read_tracks(source, columns), network)
     require_lanes(placed, Path(road).name, source)
-    sources = [source, Path(road)]
-    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE)
+    sources, far = [source, Path(road)], mostly_beside(placed)
+    return import_placed(placed, graph, settings, format="tracks", sources=sources, licence=LICENCE, notes=far)
 
 
 def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, LaneGraph]:
@@ -110,6 +113,13 @@ def place_on_road(tracks: Tracks, network: RoadNetwork) -> tuple[PlacedTracks, L
     return PlacedTracks(tracks, piece, along, offset, width, agreement, columns, scale), lanes.graph
 
 
+def mostly_beside(placed: PlacedTracks) -> list[str]:
+    """A line, where a road that was given holds less than half of the rows."""
+    beside = 100 * float((placed.piece < 0).mean())
+    far = f"{beside:.0f} % of the rows lie in no lane: are the road and x, y in the same coordinates and units?"
+    return [far] if beside > 50 else []
+
+
 def require_lanes(placed: PlacedTracks, where: str, path: Path) -> None:
     """Refuse tracks that lie beside all lanes, or drive against them. Raises `FormatError`."""
     require_lane_direction(placed.agreement, placed.tracks.speed, where, path)
@@ -127,18 +137,18 @@ def import_placed(
     if placed.tracks.step > MAX_GAP:
         what = f"rows are {placed.tracks.step:.4g} s apart (median): from {MAX_GAP:g} s on no drive can be made of them"
         raise FormatError(what, path=about["sources"][0], element="column 'time'")
-    table = _drive_table(placed, graph, settings)
+    table = drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
     tracks = placed.tracks
-    shift = of_registration(placed.offset, placed.lane_width, tracks.vehicle, tracks.heading)
-    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *tracks.notes, *([shift] if shift else []))))
+    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *placed.notes())))
     return imported(
         table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
     )  # fmt: skip
 
 
-def _drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+def drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+    """The standard columns, with `state`: which rows are cut, and why."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, list(TRUCKS))
     middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
