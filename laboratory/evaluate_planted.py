@@ -5,8 +5,8 @@
 
 Drivers of `motorway` are recorded by sensors of white noise at several rates. Right are the profile that they were
 sampled from, and one fitted to as many others through the same sensor; wrong are drivers who keep 0.35 m more to the
-left, move 1.5 times as far, or have three times the power above 0.3 Hz. Judged is by power and place, `--whole`: by all that
-`evaluate` compares, classifiers too.
+left, move 1.5 times as far, or have three times the power above 0.3 Hz. They are judged by power and place; `--whole`:
+by all that `evaluate` compares, classifiers too.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ def main() -> None:
     for noise in args.noise:
         for rate in args.rates:
             for seed in args.seeds:
-                for name, judged, words in cases(noise, rate, seed, args.whole):
-                    print(f"{noise:g} m, {rate:g} Hz, seed {seed}, {name}: {judged}: {words}", flush=True)
+                for name, verdicts, words in cases(noise, rate, seed, args.whole):
+                    print(f"{noise:g} m, {rate:g} Hz, seed {seed}, {name}: {verdicts}: {words}", flush=True)
 
 
 if __name__ == "__main__":
