@@ -53,37 +53,15 @@ def alarm_lines(pools: Sequence[Pool]) -> str:
     runs = [[float(curve.rate[curve.detector.chosen]) for curve in pool.curves] for pool in pools if pool.is_single_run]
     if runs:
         hours = sum(float(pool.curves[0].hours.sum()) for pool in pools if pool.is_single_run)
-        cells = [f"{min(rates):.1f} to {max(rates):.1f}" for rates in zip(*runs, strict=True)]
+        cells = [f"{min(rates):.1f}-{max(rates):.1f}" for rates in zip(*runs, strict=True)]
         lines.append(f"| real: {len(runs)} GNSS runs singly | {hours:.2f} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
-
-
-def default_lines(pools: Sequence[Pool]) -> str:
-    """Every rule at its default: false alarms an hour, and the median time before the marking."""
-    shown = [pool for pool in _shown(pools) if pool.name not in ("nominal", "lifelike: rural")]
-    lines = ["| detector | " + " | ".join(pool.name for pool in shown) + " |", "|---" * (1 + len(shown)) + "|"]
-    for number, first in enumerate(pools[0].curves):
-        curves = [pool.curves[number] for pool in shown]
-        cells = [f"{_rate(curve)}, {_lead(curve, curve.detector.chosen)}" for curve in curves]
-        lines.append(f"| {first.detector.label()} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
-def _shown(pools: Sequence[Pool]) -> list[Pool]:
-    """Those with cut-ins, without profiles that are variants of another."""
-    with_changes = [pool for pool in pools if len(pool.curves[0].leads)]
-    return [pool for pool in with_changes if "-vehicle-" not in pool.name]
-
-
-def _lead(curve: Curve, k: int) -> str:
-    lead = curve.lead(0.5)[k]
-    return "none seen" if np.isnan(lead) else f"{lead:.2f} s"
 
 
 def _rate(curve: Curve) -> str:
     k = curve.detector.chosen
     low, high = curve.rate_interval()[:, k]
-    return f"{curve.rate[k]:.1f}" + ("" if np.isnan(low) else f" ({low:.1f} to {high:.1f})")
+    return f"{curve.rate[k]:.1f}" + ("" if np.isnan(low) else f" ({low:.1f}-{high:.1f})")
 
 
 # ---- figure ----------------------------------------------------------------------------------------------------------

@@ -20,16 +20,11 @@ from zlib import crc32
 import pandas as pd
 
 import xosc_lateral as xl
-from laboratory.detector_table import (
-    Pool,
-    alarm_figure,
-    alarm_lines,
-    default_lines,
-)
+from laboratory.detector_table import Pool, alarm_figure, alarm_lines
 from laboratory.markers import show
 from laboratory.shortcut import played_variants, shortcut_lines
 from xosc_lateral.base.plugins import shipped_folder
-from xosc_lateral.extras.detect.detectors import RULES, LateralSpeed
+from xosc_lateral.extras.detect.detectors import LateralSpeed
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, views_of
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, drive_scenes, sources_of
 from xosc_lateral.extras.detect.tracks import Scene
@@ -148,9 +143,6 @@ def main() -> None:
             by_speed = [LateralSpeed(threshold=speed) for speed in SPEEDS]
             alarms = [Pool.of(name, views, by_speed) for name, views in traffic.items()]
             show(alarm_lines(alarms), args.write, "alarms")
-            rules = [rule() for rule in RULES.values()]
-            every = [Pool.of(name, views, rules) for name, views in traffic.items()]
-            show(default_lines(every), args.write, "defaults")
             if args.figure is not None:
                 alarm_figure(alarms).save(args.figure)
         if "shortcut" in parts:

@@ -1,10 +1,12 @@
 """What `evaluate` says of drivers whose recording is known: their own profile, a fit to other drives of it, wrong ones.
 
     python -m laboratory.evaluate_planted [--seeds 0 1 ...] [--noise METRES ...] [--rates HZ ...]
+        [--whole]
 
 Drivers of `motorway` are recorded by sensors of white noise at several rates. Right are the profile that they were
 sampled from, and one fitted to as many others through the same sensor; wrong are drivers who keep 0.35 m more to the
-left, move 1.5 times as far, or have three times the power above 0.3 Hz.
+left, move 1.5 times as far, or have three times the power above 0.3 Hz. They are judged by power and place; `--whole`:
+by all that `evaluate` compares, classifiers too.
 """
 
 from __future__ import annotations
@@ -18,13 +20,14 @@ from msgspec.structs import replace
 from tests.kit.upsampled import upsample
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Drive, all_runs
-from xosc_lateral.drivers.evaluation.scores import verdict
+from xosc_lateral.drivers.evaluation.scores import score_profile, verdict
 from xosc_lateral.drivers.evaluation.spectra import BOTH
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_profile
 from xosc_lateral.drivers.model.effects import Adapted
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.files.profiles import find_profile, read_profile
+from xosc_lateral.workflows.profiles.evaluation_page import judged, verdict_in_words
 
 STEP = 0.2
 COUNT, SECONDS, SPEED = 40, 200.0, 30.0
@@ -51,21 +54,26 @@ def wrong_drivers(profile: DriverProfile) -> dict[str, DriverProfile]:
     }
 
 
-def said(profile: DriverProfile, drives: Sequence[Drive], seed: int = 0) -> tuple[dict[str, str], str]:
+def said(
+    profile: DriverProfile, drives: Sequence[Drive], seed: int = 0, *, whole: bool = False
+) -> tuple[dict[str, str], str]:
     """Of driver and recording, as `evaluate` judges them, and its words."""
     runs = all_runs(drives)
     _, sensor = driver_runs(runs, drives)
+    if whole:
+        scores = score_profile(replace(profile, sensor=sensor), runs, seed=seed)
+        return {of: judged(scores, of) for of in BOTH}, verdict_in_words(scores)
     found = verdict(replace(profile, sensor=sensor), runs, seed)
     return {of: found.judged(of) for of in BOTH}, found.in_words()
 
 
-def cases(noise: float, rate: float, seed: int) -> Iterator[tuple[str, dict[str, str], str]]:
+def cases(noise: float, rate: float, seed: int, whole: bool) -> Iterator[tuple[str, dict[str, str], str]]:
     """Who is judged, what is said of him, and the words."""
     truth = replace(read_profile(find_profile("motorway")), effects=(), beside={})
     drives = recorded(truth, seed, noise, rate)
     fitted = fit_profile(recorded(truth, seed + 1000, noise, rate), name="fitted")
     for name, profile in {"itself": truth, "fitted to others": fitted, **wrong_drivers(truth)}.items():
-        yield name, *said(profile, drives)
+        yield name, *said(profile, drives, whole=whole)
 
 
 def main() -> None:
@@ -73,12 +81,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--noise", type=float, nargs="+", default=[0.01, 0.03, 0.05])
     parser.add_argument("--rates", type=float, nargs="+", default=[5.0, 10.0, 20.0, 50.0])
+    parser.add_argument("--whole", action="store_true")
     args = parser.parse_args()
     for noise in args.noise:
         for rate in args.rates:
             for seed in args.seeds:
-                for name, judged, words in cases(noise, rate, seed):
-                    print(f"{noise:g} m, {rate:g} Hz, seed {seed}, {name}: {judged}: {words}", flush=True)
+                for name, verdicts, words in cases(noise, rate, seed, args.whole):
+                    print(f"{noise:g} m, {rate:g} Hz, seed {seed}, {name}: {verdicts}: {words}", flush=True)
 
 
 if __name__ == "__main__":

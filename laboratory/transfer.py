@@ -283,7 +283,7 @@ def lines_of(rows: Sequence[dict[str, Any]], goal: str) -> str:
     def cell(each: Sequence[dict[str, Any]]) -> str:
         rate, low, high, seen, lead = (float(np.nanmean([row[key] for row in each]))
                                        for key in ("rate", "low", "high", "seen", "lead"))  # fmt: skip
-        return f"{rate:.0f} ({low:.0f} to {high:.0f}); {100.0 * seen:.0f} %; {lead:.2f} s"
+        return f"{rate:.0f} ({low:.0f}-{high:.0f}), {100.0 * seen:.0f}%, {lead:.2f} s"
 
     return _table(found, cell)
 
@@ -293,7 +293,7 @@ def run_lines(rows: Sequence[dict[str, Any]]) -> str:
 
     def cell(each: Sequence[dict[str, Any]]) -> str:
         runs = np.mean([row["runs"] for row in each], axis=0)
-        return f"{runs.mean():.0f} ({runs.min():.0f} to {runs.max():.0f})"
+        return f"{runs.mean():.0f} ({runs.min():.0f}-{runs.max():.0f})"
 
     return _table([row for row in rows if row["goal"] == GOALS[0]], cell)
 
@@ -317,7 +317,7 @@ def _table(found: Sequence[dict[str, Any]], cell: Callable[[Sequence[dict[str, A
     names = [
         name for name in (*(rule.title() for rule in RULES), *LEARNERS) if any(row["detector"] == name for row in found)
     ]
-    lines = ["| detector | " + " | ".join(f"set up on {home}" for home in homes) + " |"]
+    lines = ["| detector | " + " | ".join(homes) + " |"]
     lines.append("|---" * (1 + len(homes)) + "|")
     for name in names:
         each = [[row for row in found if (row["detector"], row["home"]) == (name, home)] for home in homes]
@@ -349,7 +349,7 @@ def main() -> None:
     print(lines_of(rows, "95%"))
     for goal, marker in (("20/h", "rate"), ("90% 1s", "early")):
         show(lines_of(rows, goal), args.write, f"transfer-{marker}")
-    show(told_lines(rows), args.write, "transfer-told")
+    print(told_lines(rows))
     if any(row.get("runs") for row in rows):
         show(run_lines(rows), args.write, "transfer-runs")
 

@@ -173,20 +173,20 @@ def _under(
     families, named = _distances(condition, measured, made, real, cut.group, seed)
     alone = jointly = floor = None
     stop = condition.below if condition.slow else spectra.CLASSIFIED_BELOW
-    shown = [
+    drives, copies = (
         spectra.thinned(rows if condition.slow else spectra.in_band(rows, step, stop), step, stop)
         for rows in (real, sampled)
-    ]
-    if classify and shown[0].shape[1] >= MINIMUM_ROWS:
+    )
+    if classify and drives.shape[1] >= MINIMUM_ROWS:
         fast, group = not condition.slow, cut.group
-        alone = classifier_two_sample_test(*shown, group, group, fast=fast, seed=seed)
+        alone = classifier_two_sample_test(drives, copies, group, group, fast=fast, seed=seed)
         if not condition.same_start:
             half = split_groups(group, np.random.default_rng(seed))
-            sides, drivers = (shown[0][half], shown[0][~half]), (group[half], group[~half])
+            sides, drivers = (drives[half], drives[~half]), (group[half], group[~half])
             floor = classifier_two_sample_test(*sides, *drivers, fast=fast, seed=seed)
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
-            jointly = classifier_two_sample_test(*shown, group, group, context=context, seed=seed)
+            jointly = classifier_two_sample_test(drives, copies, group, group, context=context, seed=seed)
     means = snippets.named_means(measured, made)
     return ConditionScores(
         condition, profile.sensor is not None, len(cut), families, named, means, alone, jointly, floor
