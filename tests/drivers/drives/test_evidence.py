@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.drivers.drives import evidence
+from xosc_lateral.extras.recordings.evidence import of_sizes, of_vehicles
 
 WIDTH = 3.6
 
@@ -108,14 +109,14 @@ def test_a_map_beside_its_traffic_is_named_from_half_a_metre_on_where_traffic_go
 
 def test_sizes_and_the_same_vehicle_twice_are_named() -> None:
     long, wide = np.full(9, 4.6), np.full(9, 1.8)
-    assert evidence.of_sizes(long, wide) is None
-    assert "exchanged" in (evidence.of_sizes(wide, long) or "")
-    assert "length=COLUMN:cm" in (evidence.of_sizes(100.0 * long, None) or "")
+    assert of_sizes(long, wide) is None
+    assert "exchanged" in (of_sizes(wide, long) or "")
+    assert "length=COLUMN:cm" in (of_sizes(100.0 * long, None) or "")
     time = np.tile(np.arange(0.0, 10.0, 0.1), 3)
     vehicle, zero = np.repeat([0, 1, 2], 100), np.zeros(300)
     x = 30.0 * time + np.where(vehicle == 1, 0.5, 0.0)
     y = np.where(vehicle == 2, 3.6, 0.0)
-    (line,) = evidence.of_vehicles(["a", "b", "c"], vehicle, time, x, y, zero, np.full(300, 4.6), None, 0.1)
+    (line,) = of_vehicles(["a", "b", "c"], vehicle, time, x, y, zero, np.full(300, 4.6), None, 0.1)
     assert line.startswith("b lies in a for 10.0 s")
 
 
@@ -158,4 +159,4 @@ def test_a_number_that_stands_for_no_value_is_told_where_it_comes_again_and_agai
 
 def test_sizes_in_feet_are_told_by_the_width() -> None:
     long, wide = np.full(9, 4.6), np.full(9, 1.8)
-    assert "length=COLUMN:ft, width=COLUMN:ft" in (evidence.of_sizes(long / 0.3048, wide / 0.3048) or "")
+    assert "length=COLUMN:ft, width=COLUMN:ft" in (of_sizes(long / 0.3048, wide / 0.3048) or "")

@@ -1,4 +1,4 @@
-"""What a recording says of its own signs, units, clock, places and vehicles: asked once, by all doors.
+"""What a recording says of its own signs, units, clock and places: asked once, by all doors.
 
 Each question gives a line with the option that mends it, or None. What contradicts itself is refused by who asks; what
 only makes results worse is a note. Limits are where the two readings part, not how far real driving goes:
@@ -9,14 +9,12 @@ only makes results worse is a note. Limits are where the two readings part, not 
 - clock: 1 kHz to one row in 2 s; minutes: sideways at 0.3 m/s in the median, where drivers keep lanes at 0.1;
 - shift of a map: two standard deviations of 445 real vehicles' mean offsets, 0.42 m, or half of it between the two
   directions of a road, beyond two standard errors;
-- noise of positions: 0.23 m, from which a vehicle amid its lane seems to leave it in 3 rows of 1000;
-- the same vehicle twice: middles in each other's boxes for half of the time; driven through: by two vehicles.
+- noise of positions: 0.23 m, from which a vehicle amid its lane seems to leave it in 3 rows of 1000.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -46,9 +44,6 @@ FASTEST_CLOCK = 0.02  # rows farther apart are not minutes: they would be 1.2 s 
 MINUTES_WINDOW = 0.25  # 15 s in minutes: noise is averaged out over it, and a driver has moved [s]
 LEAST_WINDOWS = 8
 WANDER_RATE = 0.3  # nobody who keeps a lane moves sideways as fast half of the time: 0.02 to 0.1 m/s do [m/s]
-USUAL_WIDTH = 1.8  # [m]
-USUAL_WIDTHS = 1.4, 2.7  # of cars to trucks in the median, with what errs [m]
-MOST_WIDTH = 3.5  # median: 2.55 m are allowed (directive 96/53/EC), boxes err by decimetres [m]
 FARTHEST_MEAN = 0.42  # two standard deviations of the mean offsets of 445 vehicles on a motorway: no traffic's mean [m]
 LEAST_VEHICLES = 5
 NEAR_ZERO = 0.1  # of the standard deviation of an offset [-]
@@ -256,7 +251,7 @@ def of_drives(offsets: Sequence[FloatArray], widths: Sequence[FloatArray]) -> li
     moving = [hash(offset.tobytes()) for offset in offsets if np.ptp(offset) > 0.0]
     again = len(moving) - len(set(moving))
     twice = f"{again} of {len(offsets)} drives repeat another one row by row: they count twice" if again else None
-    return [line for line in (shift, _noisy(noise), of_sides(np.concatenate(offsets)), twice) if line]
+    return [line for line in (shift, noisy(noise), of_sides(np.concatenate(offsets)), twice) if line]
 
 
 def of_sides(offset: FloatArray) -> str | None:
@@ -268,76 +263,8 @@ def of_sides(offset: FloatArray) -> str | None:
     return f"offsets come near 0 {visits} times and never pass it: their sign is lost"
 
 
-def of_noise(x: FloatArray, y: FloatArray, heading: FloatArray, vehicle: IntArray) -> str | None:
-    """Whether places are too noisy for lane changes: who is settled looks as if not, in 3 rows of 1000."""
-    if len(x) < 100:
-        return None
-    way = heading[1:-2]
-    third = (np.cos(way) * np.diff(y, 3) - np.sin(way) * np.diff(x, 3))[vehicle[3:] == vehicle[:-3]]
-    return _noisy(1.4826 * float(np.nanmedian(np.abs(third))) / np.sqrt(20.0) if np.isfinite(third).any() else 0.0)
-
-
-def _noisy(error: float) -> str | None:
+def noisy(error: float) -> str | None:
+    """Whether places err too much from row to row for lane changes, by so much. [m]"""
     most = SETTLED_OFFSET / 3.0
     what = f"places err by {error:.2f} m from row to row: above {most:.2f} m lane changes are invented"
     return None if error <= most else what
-
-
-# ---- vehicles against each other -------------------------------------------------------------------------------------
-def of_sizes(length: FloatArray, width: FloatArray | None) -> str | None:
-    """Whether lengths and widths are exchanged, or in another unit."""
-    known = np.isfinite(length) & (length > 0.0)
-    wide = np.full_like(length, np.nan) if width is None else width
-    both = known & np.isfinite(wide) & (wide > 0.0)
-    if both.any() and (share := float((wide[both] > length[both]).mean())) > 0.5:
-        return f"{100 * share:.0f} % of the vehicles are wider than long: length and width are exchanged"
-    if known.any() and (median := float(np.median(length[known]))) > 60.0:
-        return f"vehicles are {median:.4g} m long: length=COLUMN:{'cm' if median < 6000.0 else 'mm'}"
-    broad = float(np.median(wide[both])) if both.any() else 0.0
-    unit = next((unit for unit, by in UNIT_SIZES.items() if USUAL_WIDTHS[0] < broad / by < USUAL_WIDTHS[1]), None)
-    if broad > MOST_WIDTH and unit:
-        sizes, places = (f"{a}=COLUMN:{unit}, {b}=COLUMN:{unit}" for a, b in (("length", "width"), ("x", "y")))
-        return f"vehicles are {broad:.3g} m wide: {sizes}; and {places}, if these are too"
-    return None
-
-
-def overlaps(
-    time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray, length: FloatArray, width: FloatArray,
-    vehicle: IntArray, step: float,
-) -> Mapping[tuple[int, int], float]:  # fmt: skip
-    """Pairs of vehicles of which one's middle lies in the other, and how long: sizes may be wrong by half. [s]"""
-    from scipy.spatial import cKDTree
-
-    good = np.flatnonzero(np.isfinite(time + x + y + heading))
-    instant = np.round((time[good] - time[good].min()) / step) if len(good) else np.zeros(0)
-    apart = 1e3
-    tree = cKDTree(np.column_stack([x[good] - x[good].mean(), y[good] - y[good].mean(), instant * apart]))
-    first, second = good[tree.query_pairs(8.0, output_type="ndarray")].T if len(good) else (good, good)
-    other = vehicle[first] != vehicle[second]
-    first, second = first[other], second[other]
-    over = np.zeros(len(first), dtype=np.bool_)
-    for row, other_row in ((first, second), (second, first)):
-        c, s = np.cos(heading[row]), np.sin(heading[row])
-        dx, dy = x[other_row] - x[row], y[other_row] - y[row]
-        over |= (np.abs(c * dx + s * dy) < 0.5 * length[row]) & (np.abs(c * dy - s * dx) < 0.5 * width[row])
-    a, b = np.minimum(vehicle[first], vehicle[second])[over], np.maximum(vehicle[first], vehicle[second])[over]
-    pairs, count = np.unique(np.column_stack([a, b]), axis=0, return_counts=True)
-    return {(int(i), int(j)): n * step for (i, j), n in zip(pairs.tolist(), count.tolist(), strict=True)}
-
-
-def of_vehicles(
-    names: Sequence[str], vehicle: IntArray, time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray,
-    length: FloatArray, width: FloatArray | None, step: float,
-) -> list[str]:  # fmt: skip
-    """Who is there twice, who drives through whom, and noise: a line each."""
-    wide = np.full(len(x), USUAL_WIDTH) if width is None else width
-    lines = [line] if (line := of_noise(x, y, heading, vehicle)) else []
-    begin, end = (np.searchsorted(vehicle, np.arange(len(names)), side=side) for side in ("left", "right"))
-    lasting = time[end - 1] - time[begin]
-    pairs = overlaps(time, x, y, heading, length, wide, vehicle, step)
-    twice = {pair for pair, seconds in pairs.items() if seconds > 0.5 * min(lasting[k] for k in pair)}
-    lines += [
-        f"{names[b]} lies in {names[a]} for {pairs[a, b]:.1f} s: the same vehicle twice" for a, b in sorted(twice)
-    ]
-    met = Counter(k for pair in pairs.keys() - twice for k in pair)
-    return lines + [f"{n} vehicles drive through {names[k]}: no vehicle is there" for k, n in met.items() if n > 1]

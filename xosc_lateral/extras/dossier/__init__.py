@@ -12,3 +12,8 @@ CALLS = {
     "dossier": "xosc_lateral.extras.dossier.call",
     "Dossier": "xosc_lateral.extras.dossier.call",
 }
+SERVICES = {
+    "openlabel": "xosc_lateral.extras.dossier.labels",
+    "quality_result": "xosc_lateral.extras.dossier.labels",
+}
+"""What `convert --labels` has this extra do."""

@@ -199,12 +199,14 @@ class Conversion(ConvertedScenario, Result):
     def write_labels(self, beside: PathLike, *, force: bool = False) -> tuple[Path, Path]:
         """Write OpenLABEL tags and an ASAM quality result beside an output: ``NAME.openlabel.json``, ``NAME.xqar``."""
         from xosc_lateral.files.atomic import write_atomically
-        from xosc_lateral.workflows.conversion.labels import openlabel, quality_result
 
         tags, quality = label_files(Path(beside))
         claim([tags, quality], [self.source], force=force)
         with together():
-            return write_atomically(tags, openlabel(self)), write_atomically(quality, quality_result(self))
+            return (
+                write_atomically(tags, service("openlabel")(self)),
+                write_atomically(quality, service("quality_result")(self)),
+            )
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page about what was changed."""

@@ -18,9 +18,10 @@ from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
-from xosc_lateral.drivers.drives import evidence
 from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED
+from xosc_lateral.drivers.drives.evidence import of_clock
 from xosc_lateral.drivers.drives.identity import apart_in_time, identify
+from xosc_lateral.extras.recordings import evidence
 from xosc_lateral.extras.recordings.cuts import MOVING_SPEED, require_headings
 from xosc_lateral.files.columns import (
     as_word,
@@ -165,7 +166,7 @@ def tracks_of(table: pd.DataFrame, path: Path, saved: TableMapping, *, is_log: b
     if (factor := epoch_factor(time)) != 1.0:
         time = time * factor
     is_named = is_log or is_played or "speed" in rows or rows.attrs["names time"]
-    if wrong := evidence.of_clock(time[np.lexsort((time, codes))], is_named=is_named):  # all that moves would leap
+    if wrong := of_clock(time[np.lexsort((time, codes))], is_named=is_named):  # all that moves would leap
         raise FormatError(wrong, path=path, element="column 'time'")
     kind, usual, recording = np.full(len(time), ""), np.full(len(time), 4.6), None
     if "recording" in rows:
