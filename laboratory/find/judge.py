@@ -141,8 +141,10 @@ def happens(names, a, b):
 
     for (name, state), then in sorted(then_all.items()):
         now, starts = now_all.get((name, state), []), state == RUNNING
-        for t, u in zip(then, now, strict=False):
-            if abs(t - u) > (LATE if starts else LATE_END):
+        begun = zip(then_all.get((name, RUNNING), []), now_all.get((name, RUNNING), []), strict=False)
+        moved = [0.0] * len(then) if starts else [u - t for t, u in begun] + [0.0] * len(then)
+        for t, u, with_start in zip(then, now, moved, strict=False):
+            if min(abs(u - t), abs(u - t - with_start)) > (LATE if starts else LATE_END):  # not as its start does
                 add(f"event {'starts' if starts else 'ends'} {'later' if u > t else 'earlier'}", name, t, abs(t - u))
         for t in then[len(now) :]:
             if t < ends - 0.5:
