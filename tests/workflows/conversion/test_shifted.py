@@ -161,3 +161,17 @@ def test_who_is_ignored_may_touch_whoever_else_is_and_nobody_more(tmp_path: Path
     for ignored, count in (((), 1), (("Ego",), 1), (("Lead",), 1), (("Ego", "Lead"), 0)):
         found = compare_runs(before.scenario, before.network, before.motion, touching.motion, ignored=ignored)
         assert sum(change.pair is not None for change in found.changes) == count, ignored
+
+
+def test_contacts_that_are_gone_or_come_at_another_time_are_told(tmp_path: Path) -> None:
+    start = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 40.0)) + speed(20.0)}
+
+    def run(wanted: float) -> Played:
+        return Stage(tmp_path).play(maneuvers(event(speed(wanted), trigger=after(1.0))), start=start, last=8.0)
+
+    gone = _compare(run(30.0), run(20.0))
+    assert [(one.pair, one.how) for one in gone.changes] == [(("Ego", "Lead"), "no longer happens")]
+    moved = _compare(run(30.0), run(25.0))
+    (finding,) = moved.findings  # 25 m to close at 10 or 5 m/s
+    assert not moved.changes and finding.size == pytest.approx(2.5, abs=0.15)
+    assert str(finding.note(None)).startswith("'Ego' touches 'Lead' 2.")
