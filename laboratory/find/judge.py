@@ -41,7 +41,7 @@ TELLING = {
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
     "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
     "turns at rest": "turns",
-    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "moves|move sideways",
+    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "move sideways",
 }  # fmt: skip
 """Words of the messages that tell a kind, by how it begins."""
 DIFFERS = "in esmini|not played"
@@ -77,7 +77,7 @@ def told(finding, messages):
             return True
         if not (about and words and re.search(words, text)):
             continue
-        if finding.get("ego", "nominal") != "nominal" or re.search("more run|of the time that|never moves", text):
+        if finding.get("ego", "nominal") != "nominal" or re.search("more run|of the time that", text):
             return True
         if any(abs(one - t) <= SAME_TIME for one in times for t in (finding["t"], finding.get("since", finding["t"]))):
             return True
@@ -141,8 +141,10 @@ def happens(names, a, b):
 
     for (name, state), then in sorted(then_all.items()):
         now, starts = now_all.get((name, state), []), state == RUNNING
-        for t, u in zip(then, now, strict=False):
-            if abs(t - u) > (LATE if starts else LATE_END):
+        begun = zip(then_all.get((name, RUNNING), []), now_all.get((name, RUNNING), []), strict=False)
+        moved = [0.0] * len(then) if starts else [u - t for t, u in begun] + [0.0] * len(then)
+        for t, u, with_start in zip(then, now, moved, strict=False):
+            if min(abs(u - t), abs(u - t - with_start)) > (LATE if starts else LATE_END):  # not as its start does
                 add(f"event {'starts' if starts else 'ends'} {'later' if u > t else 'earlier'}", name, t, abs(t - u))
         for t in then[len(now) :]:
             if t < ends - 0.5:

@@ -109,8 +109,8 @@ def test_who_is_absent_is_near_nobody(network: RoadNetwork) -> None:
     assert gaps(network, staying, other) == {("slow", "other"): 0.0}
 
 
-def test_what_is_no_vehicle_has_no_gap(network: RoadNetwork) -> None:
+def test_who_walks_has_a_gap_and_who_is_alone_has_none(network: RoadNetwork) -> None:
     walker = structs.replace(entity("walker"), category=EntityCategory.PEDESTRIAN)
     here = drive(network, walker, start=10.0)
-    assert gaps(network, here, drive(network, entity("car"), start=0.0)) == {}
+    assert set(gaps(network, here, drive(network, entity("car"), start=0.0))) == {("walker", "car")}
     assert gaps(network, here) == {}

@@ -159,7 +159,7 @@ def test_what_other_egos_cause_is_never_told_as_the_scenario_s_own(tmp_path: Pat
     )
     contact = Change("contact of 'Ego' and 'Van' at 34.0 s", "Ego", 34.0, "is new", pair=("Ego", "Van"), run=braking)
     own = Change("contact of 'Slow' and 'Van' at 4.0 s", "Slow", 4.0, "is new", pair=("Slow", "Van"), run=NOMINAL_RUN)
-    kept = EquivalentPaths((), tuple(Comparison((one,), ()) for one in shifts), (own, contact), {})
+    kept = EquivalentPaths((), tuple(Comparison((one,), ()) for one in shifts), (own, contact), {}, {})
     assert kept.shifts == shifts
     assert kept.trial_contacts == (f"{contact.what} is new with the offsets (run: {braking})",)
     lines = tuple(map(str, kept.warnings((), {("Slow", "Van")})))

@@ -26,7 +26,7 @@ from tests.workflows.conversion.test_vehicle_under_test import EXTERNAL
 from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, Drive, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
-from xosc_lateral.world.motion.look import look_at, moving_share
+from xosc_lateral.world.motion.look import look_at, moving
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.motion.way import way_of
 from xosc_lateral.world.player.player import play
@@ -61,7 +61,7 @@ def test_a_car_moves_through_a_turn_and_takes_it(turning: Path, tmp_path: Path) 
     assert made.modes == {"T": "lane-offset"}
     source, car = _car(turning), _car(tmp_path / "out.xosc")
     assert (source.road[-1], source.lane[-1]) == (car.road[-1], car.lane[-1])
-    assert car.road[-1] == 2 and (moving_share(car) or 0.0) > 0.95
+    assert car.road[-1] == 2 and moving(car)[1].mean() > 0.95
     away = np.hypot(car.x - source.x, car.y - source.y)
     assert away.max() < 1.0 and np.abs(np.diff(away)).max() < 0.02
     turned = np.abs(np.angle(np.exp(1j * (car.heading - source.heading))))
@@ -123,7 +123,7 @@ def test_a_car_whose_speed_is_tied_to_an_ego_that_stops_stands_straight_and_goes
     stands = np.abs(car.speed) < 0.01
     assert stands.sum() > 100 and np.ptp(car.offset[stands]) < 1e-6
     assert np.abs(np.sin(car.heading_relative[np.abs(car.speed) < 2.0])).max() < 0.01
-    assert (moving_share(car) or 0.0) > 0.95
+    assert moving(car)[1].mean() > 0.95
 
 
 def test_the_check_sees_a_car_that_slides_is_turned_or_takes_another_road(turning: Path) -> None:

@@ -172,3 +172,17 @@ def test_on_which_side_of_a_marking_it_ends_is_nothing_where_it_ends_beside_the_
     assert _compare(edge, run(-2, width - 1.8)).changes == (), "0.1 m farther to the right"
     (change,) = _compare(edge, run(-2, -0.5)).changes
     assert change.what == "the last lane of 'Ego', -1,"
+
+
+def test_contacts_that_are_gone_or_come_at_another_time_are_told(tmp_path: Path) -> None:
+    start = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 40.0)) + speed(20.0)}
+
+    def run(wanted: float) -> Played:
+        return Stage(tmp_path).play(maneuvers(event(speed(wanted), trigger=after(1.0))), start=start, last=8.0)
+
+    gone = _compare(run(30.0), run(20.0))
+    assert [(one.pair, one.how) for one in gone.changes] == [(("Ego", "Lead"), "no longer happens")]
+    moved = _compare(run(30.0), run(25.0))
+    (finding,) = moved.findings  # 25 m to close at 10 or 5 m/s
+    assert not moved.changes and finding.size == pytest.approx(2.5, abs=0.15)
+    assert str(finding.note(None)).startswith("'Ego' touches 'Lead' 2.")

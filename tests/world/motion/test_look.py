@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from tests.kit.motion import drive, entity, two_roads
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.track import Track
-from xosc_lateral.world.motion.look import compare_tracks
+from xosc_lateral.world.motion.look import compare_tracks, rests_beside
 
 STEP = 0.02
 TIME = STEP * np.arange(1000)
@@ -65,3 +68,14 @@ def test_a_place_is_not_judged_by_the_strict_limit_after_an_event_has_moved() ->
     source, late = track(EVEN, NONE), track(EVEN + 0.12 * LATER, NONE)
     assert [one.kind for one in compare_tracks(source, late)] == ["elsewhere"]
     assert not list(compare_tracks(source, late, shifted=10.0))
+
+
+def test_who_rests_beside_the_middle_is_told_from_when_on(tmp_path: Path) -> None:
+    drives = drive(two_roads(tmp_path), entity(), start=0.0)
+    offset = 0.2 * np.sin(0.5 * drives.time)
+    assert not list(rests_beside(drives.having(offset=offset)))
+    held = np.where(
+        drives.time < 0.25 * drives.time[-1], offset, offset[np.searchsorted(drives.time, 0.25 * drives.time[-1])]
+    )
+    (found,) = rests_beside(drives.having(offset=held))
+    assert found.size == pytest.approx(0.75, abs=0.05) and found.time == pytest.approx(0.25 * drives.time[-1], abs=1.0)

@@ -203,6 +203,24 @@ def test_time_to_collision_is_not_defined_while_they_move_apart(tmp_path: Path) 
     assert fires(tmp_path, when(by_entity(inside)), start=APART) is None
 
 
+@pytest.mark.parametrize(("ahead", "told"), [(30.0, "does not hold at 0 s; in esmini"), (200.0, "")])
+def test_what_the_first_frame_of_the_reference_player_takes_otherwise_is_said(
+    tmp_path: Path, ahead: float, told: str
+) -> None:
+    """There nobody has a velocity yet: a car that drives 30 m ahead at the same speed is 1.5 s away, as if it stood."""
+    start = {
+        "Ego": teleport(on_lane(-1, 10.0)) + speed(20.0),
+        "Lead": teleport(on_lane(-1, 10.0 + ahead)) + speed(20.0),
+    }
+    inside = (
+        '<TimeToCollisionCondition value="3" rule="lessThan" freespace="false"><TimeToCollisionConditionTarget>'
+        '<EntityRef entityRef="Lead"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>'
+    )
+    marker = maneuvers(event(by_name(), trigger=when(by_entity(inside))))
+    notes = [note for note in Stage(tmp_path).play(marker, start=start, last=1.0).motion.notes if note.entity == "Lead"]
+    assert [note.what.startswith(told) for note in notes] == [True] * bool(told)
+
+
 def test_relative_speed(tmp_path: Path) -> None:
     trigger = when(by_entity('<RelativeSpeedCondition entityRef="Lead" value="0" rule="lessThan"/>'))
     assert fires(tmp_path, trigger, others=(BRAKING,)) == pytest.approx(3.02)

@@ -164,9 +164,18 @@ def test_the_target_offset_is_where_it_ends(tmp_path: Path) -> None:
     assert entity(played).y[-1] == pytest.approx(-1.5 * WIDTH + 0.4)
 
 
+def test_who_stands_turned_is_straight_from_the_begin_of_a_lane_change_on(tmp_path: Path) -> None:
+    """As in the reference player, though nothing moves yet, and another action may take over in the same frame."""
+    start = {"Ego": teleport(in_world(10.0, -0.5 * WIDTH, 0.1)) + speed(0.0)}
+    played = Stage(tmp_path).play(maneuvers(event(lane_change(to_lane(-2)), trigger=after(1.0))), start=start, last=2.0)
+    ego = entity(played)
+    assert ego.heading[row(ego, 0.9)] == pytest.approx(0.1) and ego.heading[-1] == 0.0
+
+
 def test_a_lane_that_is_not_there_is_named(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(maneuvers(event(lane_change(to_lane(-7)), trigger=after(1.0))))
-    assert any("no lane -7" in note.what and note.line for note in played.motion.notes)
+    (note,) = (note for note in played.motion.notes if "no lane -7" in note.what)
+    assert note.line and note.entity == "Ego" and note.what.endswith("(at 1.00 s)")
     assert entity(played).y[-1] == pytest.approx(-0.5 * WIDTH)
 
 

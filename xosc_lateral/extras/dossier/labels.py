@@ -33,7 +33,7 @@ ROAD_USERS = {
 """The file's category of an entity -> the ontology's."""
 
 RULES = {
-    "no_new_contact": "No two vehicles touch that nominally do not",
+    "no_new_contact": "Those touch that nominally do, and nobody else",
     "stays_in_lane": "No vehicle leaves its lane whose nominal motion does not",
     "all_is_played": "Every element of the scenario is played, as it is written",
     "no_other_warning": "Nothing else has to be known of the output",
@@ -87,7 +87,7 @@ def quality_result(made: ConvertedScenario) -> bytes:
     """Result file (``.xqar``) of ASAM's Quality Checker Framework, which its tools read and merge."""
     movement = made.movement
     problems: dict[str, list[str | Note]] = {
-        "no_new_contact": [f"{' and '.join(gap.names)} touch at {gap.time:.1f} s" for gap in movement.new_contacts],
+        "no_new_contact": list(movement.contact_notes()),
         "stays_in_lane": [f"{one.name} by {one.beyond:.2f} m at {one.time:.1f} s" for one in movement.departures],
         "all_is_played": list(movement.motion.notes),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 
@@ -49,12 +49,12 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
 
 
-def stay_as_written(enriched: Enriched) -> tuple[str, ...]:
+def stay_as_written(enriched: Enriched, on_trajectories: Collection[str]) -> tuple[str, ...]:
     """Lane changes on trajectories that stay as written although they are to be lifelike."""
     return tuple(
         stays_as_written(entity.motion, crossing, crossing.stays)
         for entity in enriched.entities
-        for crossing in (entity.crossings if entity.is_enriched else ())
+        for crossing in (entity.crossings if entity.is_enriched and entity.name in on_trajectories else ())
         if crossing.stays
     )
 

@@ -167,7 +167,7 @@ def sample(plan: Plan) -> Enriched:
     try:
         run = plan.prepared.segmented(
             plan.extended,  # played on beyond the end where the output is reactive, and the same up to there
-            ego_dependent=plan.depends.entities,
+            ego_dependent=frozenset(plan.depends.entities),
             continuous=plan.continuous,
             unforeseen=frozenset(plan.depends.begins),
             neighbours=settings.neighbours,
@@ -203,11 +203,12 @@ def _look_at_replay(written: Written) -> Written:
 def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
     """Play a reactive output in `EventEquivalence`'s ways of driving, until `most` happens otherwise."""
     source = plan.played.scenario
-    read_files = (*source.input_files, *(() if source.road_file is None else (source.road_file,)))
+    read_files = (path for path in (*source.input_files, source.road_file) if path is not None)
     allowed = (*plan.settings.allow, *(path.parent for path in read_files))
     # Parsed as if it lay at its place already; references of one in memory lead from there wherever it goes.
-    place = leads_from(plan.source, plan.output)
-    output = read_scenario(place, allowed=allowed, roads=plan.settings.roads, data=written.file.data)
+    output = read_scenario(
+        leads_from(plan.source, plan.output), allowed=allowed, roads=plan.settings.roads, data=written.file.data
+    )
     comparisons, run = plan.prepared.equivalence(tuple(plan.egos)).compare(
         output, written.vehicles.trajectories, written.with_lane_offsets, most=most
     )
@@ -217,7 +218,6 @@ def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
 def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
     """A reactive output whose vehicles move as far as that leaves what happens as it was, and what is said of it."""
     settings, provenance, phases = plan.settings, provenance_of(plan, sampled), phases_of(plan, sampled)
-    equivalence = plan.prepared.equivalence(tuple(plan.egos))
     names = [entity.name for entity in sampled.entities if entity.name in vehicles.lane_offsets]
 
     def made(ways: Mapping[str, Way]) -> list[OffsetPath]:
@@ -234,8 +234,9 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
     warned = list(kept.warnings(unmoved, known))
     if settings.player_library is not None:
         warned += service("told_by_player")(
-            settings.player_library, plan.source, (plan.output, best.file.data or b""), equivalence.runs,
-            plan.played.network, egos=plan.egos, moved=best.with_lane_offsets,
+            settings.player_library, plan.source, (plan.output, best.file.data or b""),
+            plan.prepared.equivalence(tuple(plan.egos)).runs, plan.played.network,
+            egos=plan.egos, moved=best.with_lane_offsets,
             allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
         )  # fmt: skip
     stays = (line for name in names for line in phases(name, kept.ways.get(name))[1])
@@ -248,8 +249,7 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
 def _conversion(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
     movement, file = written.movement, written.file
-    stays = [*(stay_as_written(movement) if plan.settings.lane_changes is LaneChanges.LIFELIKE else ()), *written.stays]
-    stays = [line for line in dict.fromkeys(stays) if not any(one.startswith(f"{line};") for one in stays)]
+    wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE
     messages = (
         *plan.played.motion.messages,
         *warnings(other_egos(plan.played.scenario, plan.settings, plan.egos)),
@@ -258,7 +258,8 @@ def _conversion(plan: Plan, written: Written) -> Conversion:
         *file.notes,
         *warnings(written.vehicles.frozen),
         *written.warnings,
-        *notes(stays),
+        *notes(stay_as_written(movement, written.vehicles.trajectories) if wants_lifelike else ()),
+        *notes(written.stays),
         *warnings(validity_warnings(movement)),
         *warnings((CORRIDOR_NOTE,) if plan.settings.jam_corridor else ()),
     )

@@ -101,22 +101,24 @@ def with_speeds(
     groups = []
     for entity in motion.entities:
         if entity.name in egos:
-            events = []
+            does = list[tuple[float, SpeedAction | LaneChangeAction]]()
             if entity.name in lanes:
-                name = f"{STORY} {entity.name} changes lanes"
                 across = TransitionDynamics(DynamicsShape.SINUSOIDAL, DynamicsDimension.TIME, LANE_CHANGE_TIME)
-                change = LaneChangeAction(AbsoluteTargetLane(lanes[entity.name]), across, place=place)
-                trigger = at_time(LANE_CHANGE_START, STORY, place)
-                events.append(Event(name, Priority.OVERRIDE, (Action(name, change, place, True),), trigger, place))
+                target_lane = AbsoluteTargetLane(lanes[entity.name])
+                does.append((LANE_CHANGE_START, LaneChangeAction(target_lane, across, place=place)))
             for moment, factor, rate in speeds:
-                name = f"{STORY} {entity.name} at {moment:g} s"
                 dynamics = TransitionDynamics(DynamicsShape.LINEAR, DynamicsDimension.RATE, rate)
                 target = AbsoluteTargetSpeed(factor * float(entity.speed[0]))
-                action = Action(name, SpeedAction(target, dynamics, place=place), place, True)
-                events.append(Event(name, Priority.OVERRIDE, (action,), at_time(moment, STORY, place), place))
+                does.append((moment, SpeedAction(target, dynamics, place=place)))
             name = f"{STORY} {entity.name}"
+            events = tuple(
+                Event(called, Priority.OVERRIDE, (Action(called, action, place, True),), trigger, place)
+                for called, action, trigger in (
+                    (f"{name} at {moment:g} s", action, at_time(moment, STORY, place)) for moment, action in does
+                )
+            )
             actors = Actors((entity.name,), False, place)
-            groups.append(ManeuverGroup(name, actors, (Maneuver(name, tuple(events), place),), place))
+            groups.append(ManeuverGroup(name, actors, (Maneuver(name, events, place),), place))
     story = Story(STORY, (Act(STORY, tuple(groups), None, None, place),), place)
     storyboard = structs.replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
     return replace(scenario, storyboard=storyboard)

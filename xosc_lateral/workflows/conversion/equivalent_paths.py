@@ -22,8 +22,6 @@ SIZES = (0.5, 0.25, 0.0)
 """Times what was sampled, tried for the offsets before a conflict, in order. [-]"""
 LATE, LATE_END = 0.1, 0.5
 """By which an event begins and ends earlier or later without a word, if it is explained. [s]"""
-LEAST_MOVING = 0.9
-"""Share of driving time below which it is told. [-]"""
 MOST_TRIALS = 12
 """Of a conversion: beyond, nobody else is tried, and what is left is told. [-]"""
 
@@ -50,40 +48,23 @@ class EquivalentPaths:
         return largest_of(self.comparisons)
 
     @property
-    def moving(self) -> dict[str, tuple[float, str]]:
-        """The least share of its driving time in which each entity moves sideways [-], and the run in which it is."""
-        least: dict[str, tuple[float, str]] = {}
-        for comparison in self.comparisons:
-            for name, share in comparison.moving.items():
-                here = 1.0 if share is None else share, comparison.run
-                least[name] = min(least.get(name, here), here, key=lambda each: each[0])
-        return least
-
-    @property
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        new = (one for one in self.changes if one.pair is not None and one.how == NEW)
-        return tuple(str(one) for one in new if one.pair not in nominal)
+        return tuple(str(one) for one in self.changes if one.pair and one.how == NEW and one.pair not in nominal)
 
     def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
         """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.
 
         `known`: contacts in the nominal run that others tell of
         """
-        for name in sorted(unmoved & self.smaller.keys()):
-            yield self._note(f"'{name}' stays as it is", name, is_warning=True)
         for name, (factor, everywhere) in sorted(self.smaller.items()):
-            if name not in unmoved:
-                size = f"{factor:g} times what was sampled" if factor else "none"
-                where = "" if everywhere else " before a maneuver"
-                yield self._note(f"offsets of '{name}' are {size}{where}", name, is_warning=True)
+            size = f"{factor:g} times what was sampled" if factor else "none"
+            smaller = f"offsets of '{name}' are {size}{'' if everywhere else ' before a maneuver'}"
+            what = f"'{name}' stays as it is" if name in unmoved else smaller
+            yield self._note(what, name, is_warning=True)
         for name, way in sorted(self.ways.items()):
             yield self._note(f"lane changes of '{name}' {WAY_WORDS[way]}", name)
-        for name, (share, run) in sorted(self.moving.items()):
-            if share < LEAST_MOVING:
-                moves = f"moves sideways in {share:.0%} of the time that it drives" if share else "never moves sideways"
-                yield Note(f"'{name}' {moves}", is_warning=True, entity=name, run=run)
         listed = set[tuple[str, str | None]]()
         for shift in self.shifts:
             longer, event = shift.end - shift.start, f"event '{shift.event}' of '{shift.entity}' at {shift.time:.2f} s"

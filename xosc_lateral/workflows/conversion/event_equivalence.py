@@ -29,7 +29,7 @@ from xosc_lateral.workflows.conversion.shifts import (
     runs_of,
 )
 from xosc_lateral.world.motion.gaps import gaps_of
-from xosc_lateral.world.motion.look import look_at, moving_share
+from xosc_lateral.world.motion.look import look_at, rests_beside
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
@@ -115,17 +115,12 @@ class EventEquivalence:
         """Whether everything happens in two runs of the source at the same times and places, the egos aside."""
         (_, this), (_, other) = self._before[k], self._before[j]
         then, now = runs_of(this.actions), runs_of(other.actions)
-        if then.keys() != now.keys() or any(abs(then[key].start - now[key].start) > EVENT_TOLERANCE for key in then):
-            return False
-        for entity, twin in zip(this.entities, other.entities, strict=True):
-            time = entity.time[entity.time <= twin.time[-1]]
-            apart = [
-                entity.columns[name][: len(time)] - np.interp(time, twin.time, twin.columns[name]) for name in "xy"
-            ]
-            reach = EVENT_TOLERANCE * (1.0 + np.abs(entity.speed[: len(time)]))
-            if entity.name not in self._egos and (np.hypot(*apart) > reach).any():
-                return False
-        return True
+        others = [both for both in zip(this.entities, other.entities, strict=True) if both[0].name not in self._egos]
+        return (
+            then.keys() == now.keys()
+            and all(abs(then[key].start - now[key].start) <= EVENT_TOLERANCE for key in then)
+            and not any(_far(*both) for both in others)
+        )
 
     def compare(
         self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, most: float = inf
@@ -165,14 +160,14 @@ class EventEquivalence:
                 for one in findings
                 if one.is_meaning
             )
-            shares = {one.name: moving_share(one) for one in run.entities if one.name in moved}
+            rests = (finding for one in run.entities if one.name in moved for finding in rests_beside(one))
             changes, by_chance = (
                 tuple(structs.replace(one, run=name) for one in some)
                 for some in ((*comparison.changes, *meant), by_chance)
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning))
-            comparisons[k] = Comparison(shifts, changes, remarks, by_chance, shares, name)
+            remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning), *rests)
+            comparisons[k] = Comparison(shifts, changes, remarks, by_chance, name)
             if len(changes_of(comparisons.values())) >= most:
                 break
         self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
@@ -188,6 +183,13 @@ class EventEquivalence:
             for change in compared.changes:
                 chance[change.about] = max(abs(change.size) + again.step, chance.get(change.about, 0.0))
         return chance
+
+
+def _far(entity: EntityMotion, twin: EntityMotion) -> bool:
+    """Whether an entity is ever elsewhere than in another run, as long as that lasts."""
+    time = entity.time[entity.time <= twin.time[-1]]
+    apart = [entity.columns[name][: len(time)] - np.interp(time, twin.time, twin.columns[name]) for name in "xy"]
+    return bool((np.hypot(*apart) > EVENT_TOLERANCE * (1.0 + np.abs(entity.speed[: len(time)]))).any())
 
 
 def _ending_with(scenario: Scenario, source: Scenario) -> Scenario:

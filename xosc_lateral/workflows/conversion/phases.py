@@ -160,10 +160,9 @@ class _Phases:
 
         A rate is in proportion to the way: so it lasts as long, and longer where a vehicle under test leads it farther.
         """
-        motion, row, last = self._entity.motion, crossing.last, self._crossed[crossing.path]
+        motion, last = self._entity.motion, self._crossed[crossing.path]
         aside, side = float(self._offset(np.array([last]))[0]), self._way.side_at(last)
-        direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
-        there = direction * float(motion.offset[row]) + side * aside
+        there = self._offset_t(crossing.last, side * aside)
         dynamics = lane_changes_of(self._plan.played.scenario, motion.name)[crossing.path][1].dynamics
         way, rate = float(crossing.way[-1]), 0.0
         if dynamics.dimension is DynamicsDimension.RATE and abs(way) > LEAST_MOVE:
@@ -202,9 +201,13 @@ class _Phases:
         path = self._path(adding, self._driven_at(time), start)
         if path is None or not is_aside:
             return path if path is None else structs.replace(path, time=time)
-        direction = float(self._network.travel_directions(motion.road[:1], motion.lane[:1])[0])
-        placed_t = direction * float(motion.offset[0]) + path.side * start
-        return structs.replace(path, placed_t=placed_t, start=start)
+        return structs.replace(path, placed_t=self._offset_t(0, path.side * start), start=start)
+
+    def _offset_t(self, row: int, aside: float) -> float:
+        """Along +t from its lane's centre, so far along +t from where it is in a row of its nominal run. [m]"""
+        motion = self._entity.motion
+        direction = self._network.travel_direction(int(motion.road[row]), int(motion.lane[row]))
+        return direction * float(motion.offset[row]) + aside
 
     def after(self, action: Path) -> OffsetPath | None:
         """From the end of an action in the nominal run, or else as on the longest segment."""
@@ -226,8 +229,7 @@ class _Phases:
         aside = float(self._offset(np.array([begin + length]))[0])
         path = self._path(action, begin + length, aside)
         row = min(int(np.searchsorted(self._driven, begin)), len(motion.time) - 1)
-        direction = float(self._network.travel_direction(int(motion.road[row]), int(motion.lane[row])))
-        there = direction * float(motion.offset[row]) + self._way.side_at(begin) * aside
+        there = self._offset_t(row, self._way.side_at(begin) * aside)
         return path if path is None else structs.replace(path, settles=(there, length))
 
     def already_there(self) -> Iterator[OffsetPath]:

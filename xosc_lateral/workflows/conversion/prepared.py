@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.source import check_regular, guard_input, state_key
@@ -15,45 +16,34 @@ from xosc_lateral.workflows.conversion.load import Played, load_scenario, play_l
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 from xosc_lateral.world.player.player import play
 
-Latest = TypeVar("Latest")
-
 
 class Prepared:
     """A scenario, its road and its nominal run; other runs and its segments when they are first asked for."""
 
     def __init__(self, source: Path, settings: ConvertSettings) -> None:
         self._source, self._asked, self._state = source, _asked(settings), state_key(check_regular(source))
-        self._step, self._time_limit = settings.step, settings.time_limit
         self.loaded = load_scenario(
             source, parameters=settings.parameters, allowed=settings.allow, roads=settings.roads, strict=settings.strict
         )
-        self.played = play_loaded(self.loaded, self._step, self._time_limit)
-        self._latest: dict[str, tuple[Hashable, object]] = {}
+        self.played = played = play_loaded(self.loaded, settings.step, settings.time_limit)
+        step, limit = settings.step, settings.time_limit
 
-    def equivalence(self, egos: tuple[str, ...]) -> EventEquivalence:
-        """What happens, also where these vehicles under test drive otherwise."""
-        return self._latest_made(
-            "meaning", egos, lambda: EventEquivalence(self.played, egos, step=self._step, time_limit=self._time_limit)
-        )
+        # Of each the latest is kept: variants with the same settings come one after another.
+        def later(end: float) -> Played:
+            run = play(ending_at(played.scenario, end), played.network, step=step, time_limit=end + 1.0)
+            return replace(played, motion=run)
 
-    def until(self, end: float) -> Played:
+        self.equivalence = lru_cache(1)(lambda egos: EventEquivalence(played, egos, step=step, time_limit=limit))
+        """What happens, also where these vehicles under test (a tuple of names) drive otherwise."""
+        self.until = lru_cache(1)(later)
         """The same run, stopped at another time. [s]"""
-        played = self.played
-
-        def stopped() -> Played:
-            later = ending_at(played.scenario, end)
-            return replace(played, motion=play(later, played.network, step=self._step, time_limit=end + 1.0))
-
-        return self._latest_made("until", end, stopped)
+        self._segmented = lru_cache(1)(partial(SegmentedRun, network=played.network, trailers=played.trailers))
 
     def segmented(self, run: Played, **choices: Any) -> SegmentedRun:
         """One of its runs as drivers see it, see `SegmentedRun`; kept where it is small."""
-        key = run.motion, tuple(choices.items())
-        made = self._latest_made(
-            "segmented", key, lambda: SegmentedRun(run.motion, run.network, trailers=run.trailers, **choices)
-        )
+        made = self._segmented(run.motion, **choices)
         if not made.is_small:
-            del self._latest["segmented"]
+            self._segmented.cache_clear()
         return made
 
     def holds_for(self, source: Path, settings: ConvertSettings) -> bool:
@@ -66,14 +56,6 @@ class Prepared:
         guard_input(source)
         road = scenario.road_file
         return road is None or (is_file(road) and road_network(road) is self.loaded.network)
-
-    def _latest_made(self, name: str, key: Hashable, make: Callable[[], Latest]) -> Latest:
-        """The latest of a kind: variants with the same settings come one after another."""
-        before, value = self._latest.get(name, (None, None))
-        if before != key:
-            value = make()
-            self._latest[name] = key, value
-        return value  # type: ignore[return-value]
 
 
 def _asked(settings: ConvertSettings) -> Hashable:

@@ -202,8 +202,8 @@ class Enriched:
         """Contacts and lane departures that nominally are none. [-]"""
         return len(self.new_contacts) + len(self.departures)
 
-    def warnings(self) -> Iterator[Note]:
-        """What a user has to know of it."""
+    def contact_notes(self) -> Iterator[Note]:
+        """Contacts that are new, and that are gone."""
         for gaps, what in (
             (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
             (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
@@ -211,6 +211,10 @@ class Enriched:
             for gap in gaps:
                 both = "'{}' and '{}' ".format(*gap.names)
                 yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
+
+    def warnings(self) -> Iterator[Note]:
+        """What a user has to know of it."""
+        yield from self.contact_notes()
         for departure in self.departures:
             what = f"'{departure.name}' leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             yield Note(what, is_warning=True, entity=departure.name, run=NOMINAL_RUN)

@@ -92,8 +92,6 @@ class Comparison(Struct, frozen=True):
     changes: tuple[Change, ...]
     findings: tuple[Finding, ...] = ()  # how vehicles move otherwise, and where they are elsewhere
     by_chance: tuple[Change, ...] = ()  # what hangs on a frame: the source does it otherwise, too, in other frames
-    # moving: share of each vehicle's driving time in which it moves sideways; None: it does not drive [-]
-    moving: Mapping[str, float | None] = {}
     run: str = ""  # how vehicles under test drive in both
 
     @property
@@ -362,10 +360,8 @@ def _last_places(entity: EntityMotion, end: float, network: RoadNetwork) -> tupl
 def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:
     """Each event once for every way of driving, with its largest shift there: in order of these ways, and of time."""
     largest: dict[tuple[str, str, str | None], EventShift] = {}
-    for shift in (one for comparison in comparisons for one in comparison.shifts):
-        key = shift.run, shift.event, shift.entity
-        size = max(abs(shift.start), abs(shift.end))
-        if key not in largest or size > max(abs(largest[key].start), abs(largest[key].end), -inf):
-            largest[key] = shift
-    runs = list(dict.fromkeys(run for run, _, _ in largest))
+    shifts = [shift for comparison in comparisons for shift in comparison.shifts]
+    for shift in sorted(shifts, key=lambda one: max(abs(one.start), abs(one.end)), reverse=True):
+        largest.setdefault((shift.run, shift.event, shift.entity), shift)
+    runs = list(dict.fromkeys(shift.run for shift in shifts))
     return tuple(sorted(largest.values(), key=lambda shift: (runs.index(shift.run), shift.time)))

@@ -26,8 +26,8 @@ WINDOW = 1.0
 """In which somebody who drives is seen to move, or to slide. [s]"""
 MOVED = 0.001
 """So far sideways at least. [m]"""
-DRIVING_SPEED = 3.0
-"""Above which somebody drives. [m/s]"""
+DRIVING_SPEED, LEAST_MOVING = 3.0, 0.9
+"""Above which somebody drives [m/s], and share of that time that somebody with offsets moves in. [-]"""
 LARGEST_SLIDE = 0.05
 """By which a way may be longer in a window than what the speed says, more than in the source. [m]"""
 LOOK_STEP, LOOK_AROUND = 0.1, 3.0
@@ -110,12 +110,8 @@ def compare_parts(source: Track, other: Track) -> Iterator[Finding]:
 def worst_of(findings: Iterable[Finding]) -> list[Finding]:
     """Of each kind and entity."""
     worst: dict[tuple[str, str], Finding] = {}
-    for finding in findings:
-        if (
-            finding.size > worst.get((finding.entity, finding.kind), finding).size
-            or (finding.entity, finding.kind) not in worst
-        ):
-            worst[finding.entity, finding.kind] = finding
+    for finding in sorted(findings, key=lambda one: one.size, reverse=True):
+        worst.setdefault((finding.entity, finding.kind), finding)
     return list(worst.values())
 
 
@@ -133,16 +129,22 @@ def compare_tracks(source: Track, other: Track, shifted: float = inf) -> Iterato
     yield from _at_rest(both)
 
 
-def moving_share(entity: EntityMotion) -> float | None:
-    """Share of the time in which a vehicle drives, none of its lateral actions running, that it moves sideways; None:
-    it never does. [-]
-    """
+def rests_beside(entity: EntityMotion) -> Iterator[Finding]:
+    """A vehicle with offsets that does not move sideways in much of the time in which it drives freely."""
+    time, moves = moving(entity)
+    if len(moves) and moves.mean() < LEAST_MOVING:
+        share = 1.0 - float(moves.mean())
+        what = f"does not move sideways in {share:.0%} of the time that it drives, first"
+        yield Finding("rests", entity.name, float(time[np.argmin(moves)]), share, what)
+
+
+def moving(entity: EntityMotion) -> tuple[FloatArray, BoolArray]:
+    """Times at which a vehicle drives, none of its lateral actions running [s], and whether it moves sideways then."""
     drives = _is_free(entity) & (np.abs(entity.speed) > DRIVING_SPEED)
     step = np.diff(entity.offset, prepend=entity.offset[:1])
     step[np.flatnonzero(np.diff(entity.lane) | np.diff(entity.road)) + 1] = 0.0
     step[entity.breaks] = 0.0
-    moves = _over_window(entity, np.abs(step)) > MOVED
-    return float(np.mean(moves[drives])) if drives.any() else None
+    return entity.time[drives], _over_window(entity, np.abs(step))[drives] > MOVED
 
 
 # ---- poses alone -----------------------------------------------------------------------------------------------------

@@ -13,9 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import copysign, cos, hypot, inf, sin
-from typing import NamedTuple
 
-from msgspec import Struct, field
+from msgspec import Struct
 from msgspec.structs import replace
 
 from xosc_lateral.world.player.drive import drawn_by
@@ -24,7 +23,7 @@ from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.player.transition import EPSILON
 from xosc_lateral.world.road.lanes import lanes_between
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.positions import Pose, RoadPath
+from xosc_lateral.world.road.positions import RoadPath
 from xosc_lateral.world.scenario.enums import CoordinateSystem, RelativeDistanceType
 
 _ALONG_ROADS = (CoordinateSystem.ROAD, CoordinateSystem.LANE)
@@ -138,21 +137,12 @@ def _across(here: Spot, spot: Spot, path: RoadPath) -> float:
     return spot.t - (-here.t if path.is_turned else here.t)
 
 
-class _Seen(NamedTuple):
-    """A gap along the roads that was measured [m]; who was where then, and how far each may go on its road [m]."""
-
-    gap: float
-    poses: tuple[Pose, Pose]
-    rooms: tuple[float, float]
-
-
 class Measure(Struct, frozen=True, eq=False):
     """How a distance is measured, between boxes or reference points; None where no way leads along the roads."""
 
     system: CoordinateSystem
     kind: RelativeDistanceType
     freespace: bool = False
-    seen: dict[tuple[str, str], _Seen] = field(default_factory=dict)  # by the names of who and whom
 
     @property
     def is_along_roads(self) -> bool:
@@ -191,26 +181,19 @@ class Measure(Struct, frozen=True, eq=False):
             return 0.0
         else:
             gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
-        if may_be_far and gap is not None:
-            rooms = _room(state), _room(other)
-            self.seen[state.name, other.name] = _Seen(gap, (state.plane, other.plane), rooms)
         return gap
 
     def _at_least(self, state: EntityState, other: EntityState) -> float:
-        """How far away it is at least, ahead or behind: by where both are, or by how far each has gone since. [m]
-
-        No road bends so much that a way is half as long along its reference line.
+        """How far away it is at least, ahead or behind: by where both are, else from one's place on its road to the
+        other's. No road bends so much that a way is half as long along its reference line.
         """
-        sizes = (_reach(state), _reach(other)) if self.freespace else (0.0, 0.0)
-        least = 0.5 * apart(state, other.plane.x, other.plane.y) - sum(sizes)
-        if (seen := self.seen.get((state.name, other.name))) is None:
-            return least
-        gone = [
-            2.0 * (apart(one, then.x, then.y) + size * abs(one.plane.heading - then.heading))
-            for one, then, size in zip((state, other), seen.poses, sizes, strict=True)
-        ]
-        is_known = all(way < room for way, room in zip(gone, seen.rooms, strict=True))
-        return max(least, abs(seen.gap) - sum(gone)) if is_known else least
+        sizes = _reach(state) + _reach(other) if self.freespace else 0.0
+        least = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes
+        if least > 0.0 and self.freespace and min(_room(state), _room(other)) > 0.0:
+            path = _path_between(state, spot_of(state), spot_of(other))
+            stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
+            return least if path is None else max(least, abs(path.ds) - stretch * sizes)
+        return least
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
         """From an entity to a spot. [m]"""
@@ -311,6 +294,13 @@ def _room(state: EntityState) -> float:
     if state.road == NO_ROAD or (road := state.network.roads[state.road]).junction is not None:
         return 0.0
     return min(state.s, road.length - state.s) - 2.0 * _reach(state)
+
+
+def _bend(state: EntityState) -> float:
+    """By how much less than its way a part of an entity goes along the reference line, at most, where it is. [-]"""
+    reach = _reach(state)
+    bends = (abs(state.network.curvature_at(state.road, state.s + ds)) for ds in (-reach, 0.0, reach))
+    return (abs(state.t) + reach) * max(bends)
 
 
 def _reach(state: EntityState) -> float:
