@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from xosc_lateral.extras.live.esmini import EsminiTraffic
-from xosc_lateral.extras.live.esmini_library import Player, open_player
+from xosc_lateral.extras.live.esmini_library import EsminiLibrary, open_player
 from xosc_lateral.files.openscenario.read import read_scenario
 
 STEP, EVERY = 0.01, 5
@@ -90,7 +90,7 @@ def play(library: Path, scenario: Path, *, drivers: bool, ego: bool, seconds: fl
     """Play in this process."""
     import ctypes
 
-    player: Player = open_player(library, scenario)
+    player: EsminiLibrary = open_player(library, scenario)
     raw = ctypes.CDLL(str(library))
     raw.SE_ReportObjectRoadPos.argtypes = [
         ctypes.c_int,

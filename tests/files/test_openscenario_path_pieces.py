@@ -10,13 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.motion.path_pieces import PathPiece, cut_path, vertex_times
+from xosc_lateral.world.motion.path_pieces import RowStretch, cut_path, vertex_times
 
 STEP = 0.02
 FloatArray = NDArray[np.float64]
 
 
-def pieces(x: FloatArray, *, active: FloatArray | None = None, teleported: FloatArray | None = None) -> list[PathPiece]:
+def pieces(
+    x: FloatArray, *, active: FloatArray | None = None, teleported: FloatArray | None = None
+) -> list[RowStretch]:
     time = STEP * np.arange(len(x))
     there = np.ones(len(x), bool) if active is None else active.astype(bool)
     placed = np.zeros(len(x), bool) if teleported is None else teleported.astype(bool)
@@ -28,7 +30,7 @@ def driven(speed: FloatArray) -> FloatArray:
     return np.concatenate(([0.0], np.cumsum(speed[1:] * STEP)))
 
 
-def checked(x: FloatArray, piece: PathPiece) -> tuple[FloatArray, float, float]:
+def checked(x: FloatArray, piece: RowStretch) -> tuple[FloatArray, float, float]:
     """Vertex times, least spacing, largest error of one piece."""
     time = (STEP * np.arange(len(x)))[piece.first : piece.last + 1]
     inside = x[piece.first : piece.last + 1]
@@ -43,7 +45,7 @@ TIME = STEP * np.arange(1500)
 def test_steady_driving_is_one_move_with_a_vertex_every_tenth_of_a_second() -> None:
     x = driven(np.full_like(TIME, 30.0))
     (piece,) = pieces(x)
-    assert piece == PathPiece(0, len(x) - 1, placed=False, stops=False)
+    assert piece == RowStretch(0, len(x) - 1, placed=False, stops=False)
     times, _, error = checked(x, piece)
     assert np.diff(times) == pytest.approx(times[1] - times[0], abs=1e-9)
     assert times[1] - times[0] == pytest.approx(0.1, rel=0.01)
@@ -123,7 +125,7 @@ def test_a_teleport_to_a_place_to_stand_at_is_a_move_of_one_row() -> None:
     x = np.where(np.arange(300) < 100, 0.0, 50.0)
     teleported = np.zeros_like(x)
     teleported[100] = 1
-    assert pieces(x, teleported=teleported) == [PathPiece(100, 100, placed=True, stops=True)]
+    assert pieces(x, teleported=teleported) == [RowStretch(100, 100, placed=True, stops=True)]
 
 
 def test_an_entity_that_is_added_later_is_placed() -> None:

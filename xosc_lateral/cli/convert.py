@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Writing, command, say, say_json, write_stdout
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
@@ -60,7 +60,7 @@ def convert(
         help="What was added, by the file's ending: page (.html), Markdown with the numbers and two pictures for a "
         "pull request (.md), ASAM OSI trace with lanes, boxes and motion (.mcap, .osi; extra osi). May be repeated. "
         "Of a batch: a folder of pages.")] = None,
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.workflows.batch.guard import JobLimits
@@ -112,7 +112,7 @@ def _reports(files: Sequence[str]) -> dict[str, str]:
 
 def _convert_one(
     source: Path, output: str | None, reports: Mapping[str, str], options: dict[str, Any], limits: JobLimits,
-    variants: int, reply: Written, *, labels: bool,
+    variants: int, reply: Writing, *, labels: bool,
 ) -> None:
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
@@ -168,7 +168,7 @@ def _convert_one(
         raise typer.Exit(1)
 
 
-def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], reply: Written) -> None:
+def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[str, Any], reply: Writing) -> None:
     """Convert all of them; exit code 1 if any failed, or with `--strict` if anything is to be said of any."""
     from xosc_lateral.workflows.batch.call import convert_many
 
@@ -217,7 +217,7 @@ def reproduce(
     output: Annotated[Path, typer.Argument(metavar="OUTPUT", help="Converted scenario, or a folder with a manifest.",
         show_default=False)],
     new: Annotated[str, typer.Option("--output", "-o", help="File or folder to write to.", show_default=False)],
-    *, options: Annotated[Options, xl.reproduce], reply: Written,
+    *, options: Annotated[Options, xl.reproduce], reply: Writing,
 ) -> None:
     """Make an output, or a folder of them, again and compare the content; exit code 1 if it differs."""
     result = xl.reproduce(output, new, **options, force=reply.force)

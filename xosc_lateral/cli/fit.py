@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Strict, Tables, Written, command, refuse_warnings, write_stdout
+from xosc_lateral.cli.words import Options, Strict, Tables, Writing, command, refuse_warnings, write_stdout
 
 # What is said of one option stays together.
 # fmt: off
@@ -26,7 +26,7 @@ def check(
     write_mapping: Annotated[str | None, typer.Option(metavar="FILE.toml",
         help="Write the mapping that is proposed.")] = None,
     options: Annotated[Options, xl.check],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """What tables of drives hold: columns, units, signs, gaps, sensor noise; what can be fitted, and what not."""
     page, mapping = reply.claim(tables, page=(report, "health.html"), mapping=(write_mapping, "mapping.toml"))
@@ -51,7 +51,7 @@ def fit(
         help="Profile to write: file, folder/, or -.")],
     options: Annotated[Options, xl.fit],
     strict: Strict = False,
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Fit a driver profile to measured drives."""
     from xosc_lateral.files.profiles import describe_profile, profile_bytes, profile_record
@@ -85,7 +85,7 @@ def sample(
         help="Table: .csv, .csv.gz, .parquet, folder/, - .")],
     options: Annotated[Options, xl.sample],
     strict: Strict = False,
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Sample offsets from a profile (one of --like, --context, --duration)."""
     if sum(name in options for name in ("like", "context", "duration")) != 1:
@@ -107,7 +107,7 @@ def evaluate(
     tables: Tables, *,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Write a report with figures.")] = None,
     options: Annotated[Options, xl.evaluate],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     (page,) = reply.claim(tables, page=(report, "evaluation.html"))

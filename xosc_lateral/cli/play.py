@@ -18,7 +18,7 @@ from xosc_lateral.cli.words import (
     Printing,
     Quiet,
     Verbose,
-    Written,
+    Writing,
     command,
     naming_option,
     pairs,
@@ -56,7 +56,7 @@ def states(
         show_default=False)] = None,
     osi: Osi = None,
     options: Annotated[Options, xl.play],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     if output is None and osi is None:
@@ -168,7 +168,7 @@ def write(
     output: Annotated[str, typer.Option("--output", "--out", "-o", help="Folder to write to.", show_default=False)],
     settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE",
         help="Change a setting; may be repeated.")] = None,
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Write a template's scenario and its road."""
     chosen: dict[str, str] = pairs(settings, "--set")

@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Printing, Written, command, say, say_json, write_stdout
+from xosc_lateral.cli.words import Options, Printing, Writing, command, say, say_json, write_stdout
 from xosc_lateral.workflows.profiles import profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
@@ -33,7 +33,7 @@ def list_(
 
 @command(group, "show", "Show one profile's card.", "profiles show motorway --report card.html")
 def show(
-    profile: Name, *, options: Annotated[Options, xl.read_profile], report: Page = None, reply: Written,
+    profile: Name, *, options: Annotated[Options, xl.read_profile], report: Page = None, reply: Writing,
 ) -> None:
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral.workflows.conversion.driver_context import NEIGHBOURS
@@ -54,7 +54,7 @@ def show(
     group, "compare", "Compare several profiles.", "profiles compare motorway motorway-vehicle-1 --report compared.html"
 )
 def compare(
-    names: Names, *, options: Annotated[Options, xl.compare_profiles], report: Page = None, reply: Written,
+    names: Names, *, options: Annotated[Options, xl.compare_profiles], report: Page = None, reply: Writing,
 ) -> None:
     """Compare profiles, and show which are not distinguishable."""
     if len(names) < 2:
@@ -75,7 +75,7 @@ def derive(
     base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
     output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
     options: Annotated[Options, profiles.derive_profile],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
 
@@ -98,7 +98,7 @@ def derive(
     group, "add", "Add a profile to a library.", "profiles add mine.json --library team/ --tag truck --set country=DE"
 )
 def add(
-    profile: Name, *, options: Annotated[Options, profiles.add_profile], reply: Written,
+    profile: Name, *, options: Annotated[Options, profiles.add_profile], reply: Writing,
 ) -> None:
     """Put a profile into a library's folder, with tags and metadata."""
     path = profiles.add_profile(profile, **options, force=reply.force)
@@ -127,7 +127,7 @@ def remove(names: Names, *, options: Annotated[Options, profiles.remove_profiles
 def rename(
     name: Name,
     new: Annotated[str, typer.Argument(metavar="NEW", help="Its new id.", show_default=False)],
-    *, options: Annotated[Options, profiles.rename_profile], reply: Written,
+    *, options: Annotated[Options, profiles.rename_profile], reply: Writing,
 ) -> None:
     """Change a profile's id, in its file and as the file's name. Its hash changes with it."""
     path = profiles.rename_profile(name, new, **options, force=reply.force)
@@ -151,7 +151,7 @@ def export(
     names: Names, *,
     output: Annotated[str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.",
         show_default=False)],
-    options: Annotated[Options, xl.read_profile], reply: Written,
+    options: Annotated[Options, xl.read_profile], reply: Writing,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral.files.output_paths import STDOUT, is_folder

@@ -178,7 +178,7 @@ class Printing:
 
 
 @dataclass(frozen=True, slots=True)
-class Written(Printing):
+class Writing(Printing):
     """The same of verbs that write files."""
 
     force: Force = False

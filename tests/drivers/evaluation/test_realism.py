@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from tests.kit.runs import smooth_runs
 from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.evaluation.realism import Beside, Realism, score_realism
+from xosc_lateral.drivers.evaluation.realism import Realism, WithFloor, score_realism
 from xosc_lateral.drivers.evaluation.snippets import SnippetCondition, sample_runs, sensor_noise
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -102,7 +102,7 @@ def test_a_foreign_place_shows_in_free_runs_and_less_from_the_same_start(profile
 
 
 def test_a_floor_of_zero_has_no_ratio():
-    assert np.isnan(Beside(0.1, 0.0).ratio) and Beside(0.1, 0.2).ratio == pytest.approx(0.5)
+    assert np.isnan(WithFloor(0.1, 0.0).ratio) and WithFloor(0.1, 0.2).ratio == pytest.approx(0.5)
 
 
 def test_the_fade_of_the_papers_model_is_said(profile: DriverProfile):

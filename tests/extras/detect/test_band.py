@@ -10,7 +10,7 @@ import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, track
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.band import RECORDED, Band, band_of, keeping_spectrum, spectrum_in
+from xosc_lateral.extras.detect.band import RECORDED, SensorBand, band_of, keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.tracks import STEP
 from xosc_lateral.files.profiles import read_profile
 
@@ -46,7 +46,7 @@ def test_a_known_filter_is_found_again_and_home_has_the_recording_s_spectrum_thr
 
 
 def test_a_sine_is_seen_at_its_frequency_s_share_and_a_lane_change_as_it_is():
-    band = Band(np.array([0.15, 0.3, 0.9]), np.array([1.0, 0.5, 0.1]))
+    band = SensorBand(np.array([0.15, 0.3, 0.9]), np.array([1.0, 0.5, 0.1]))
     time = STEP * np.arange(2400)
     sine = np.sin(2.0 * np.pi * 0.3 * time)
     np.testing.assert_allclose(band.seen(sine)[400:-400], 0.5 * sine[400:-400], atol=0.02)

@@ -32,7 +32,7 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.extras.live.call import live_esmini
 from xosc_lateral.extras.live.esmini import EsminiTraffic, lateral_actions
-from xosc_lateral.extras.live.esmini_library import ObjectState, Player, open_player
+from xosc_lateral.extras.live.esmini_library import EsminiLibrary, ObjectState, open_player
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.motion.driver_clock import LARGEST_TURN_RATE
@@ -237,7 +237,9 @@ def test_with_an_external_ego_every_trigger_fires_as_without_drivers(factor: flo
         library.SE_ReportObjectSpeed.argtypes = [ctypes.c_int, ctypes.c_double]
         events: list[tuple[float, str, int]] = []
 
-        def note(name: bytes, _kind: int, state: int, path: bytes, player: Player = player, to: Any = events) -> None:
+        def note(
+            name: bytes, _kind: int, state: int, path: bytes, player: EsminiLibrary = player, to: Any = events
+        ) -> None:
             to.append((player.SE_GetSimulationTime(), path.decode(), state))
 
         profile = read_profile("motorway")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from xosc_lateral.drivers.evaluation.realism import Beside
+from xosc_lateral.drivers.evaluation.realism import WithFloor
 from xosc_lateral.workflows.profiles.evaluation_page import judged, verdict_in_words
 from xosc_lateral.workflows.profiles.realism_text import FAMILY_LABELS
 
@@ -14,7 +14,7 @@ LIKE_OTHERS = "like other real drivers up to 1.5 Hz, all that is compared"
 
 def scores(**errors: float) -> Any:
     """Every block three times as far as real drivers are, the ratio's logarithm known to so much, or not at all."""
-    families = {name: Beside(3.0, 1.0, "sd", errors.get(name, 2.0)) for name in FAMILY_LABELS}
+    families = {name: WithFloor(3.0, 1.0, "sd", errors.get(name, 2.0)) for name in FAMILY_LABELS}
     one = SimpleNamespace(
         condition=SimpleNamespace(name="free driving", slow=True), families=families, alone=None,
         jointly=SimpleNamespace(auc=0.5, low=0.4, high=0.6),

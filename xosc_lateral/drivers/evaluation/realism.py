@@ -60,7 +60,7 @@ ENSEMBLE_SIZE, SCORED_SNIPPETS = 8, 200
 
 
 @dataclass(frozen=True)
-class Beside:
+class WithFloor:
     """A number, and what real driving of other drivers gets (the floor). Unit in its name's table."""
 
     value: float
@@ -89,8 +89,8 @@ class ConditionScores:
     count: int  # Snippets.
     # `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `snippets.differences`. With the same start and
     # 10 s, also the proper scores [m].
-    families: Mapping[str, Beside]
-    named: Mapping[str, Beside]  # Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
+    families: Mapping[str, WithFloor]
+    named: Mapping[str, WithFloor]  # Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
     # Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
     means: Mapping[str, tuple[float, float]]
     # Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
@@ -200,7 +200,7 @@ def _distances(
     real: FloatArray,
     group: NDArray[np.str_],
     seed: int,
-) -> tuple[dict[str, Beside], dict[str, Beside]]:
+) -> tuple[dict[str, WithFloor], dict[str, WithFloor]]:
     """Over random halves: a half beside its own sampled snippets, and beside the other half; equally many in both."""
     rng = np.random.default_rng(seed)
     values, floors, named, named_floors = [], [], [], []
@@ -222,14 +222,14 @@ def _distances(
 
 def _beside(
     values: Sequence[Mapping[str, float]], floors: Sequence[Mapping[str, float]], units: Mapping[str, str]
-) -> dict[str, Beside]:
+) -> dict[str, WithFloor]:
     """Means over random halves; halves differ as much as wholes drawn anew do (delete-half jackknife)."""
     measures = {}
     for name in values[0]:
         value, floor = (np.array([one[name] for one in several]) for several in (values, floors))
         with np.errstate(divide="ignore", invalid="ignore"):
             error = float(np.log(value / floor).std(ddof=1))
-        measures[name] = Beside(float(value.mean()), float(floor.mean()), units.get(name, "sd"), error)
+        measures[name] = WithFloor(float(value.mean()), float(floor.mean()), units.get(name, "sd"), error)
     return measures
 
 
@@ -247,5 +247,5 @@ def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Sn
     seen = spectra.in_band(cut.offset, step)
     sampled = proper_scores(seen[chosen], np.stack(members, axis=1))
     real = proper_scores(seen[chosen], seen[drivers])
-    added = {name: Beside(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
+    added = {name: WithFloor(sampled[name], real[name], SCORE_UNITS[name]) for name in sampled}
     return replace(scores, families={**scores.families, **added})

@@ -28,7 +28,7 @@ from xosc_lateral.drivers.evaluation.metrics import (
     snippet_metrics,
     split_groups,
 )
-from xosc_lateral.drivers.evaluation.realism import Beside, ConditionScores, Realism, score_realism
+from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism, WithFloor, score_realism
 from xosc_lateral.drivers.evaluation.snippets import (
     PartEvaluation,
     SnippetCondition,
@@ -361,7 +361,7 @@ def _condition_to_dict(scores: ConditionScores) -> dict[str, Any]:
     }
 
 
-def _beside_to_dict(number: Beside) -> dict[str, Any]:
+def _beside_to_dict(number: WithFloor) -> dict[str, Any]:
     ratio = round(number.ratio, 3) if isfinite(number.ratio) else None
     interval = list(all_significant(np.array(number.interval), 3)) if isfinite(number.error) else None
     return {"value": round(number.value, 4), "floor": round(number.floor, 4), "ratio": ratio, "interval": interval}

@@ -26,7 +26,7 @@ LEAST_FREQUENCY = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
+class SensorBand:
     """Share of the amplitude that is seen at each frequency; shape (n,) each. [Hz], [-]"""
 
     frequency: FloatArray
@@ -66,14 +66,14 @@ def keeping_spectrum(tracks: Iterable[LaneTrack], source: str) -> Spectrum:
     return spectrum(runs, ROWS * STEP)
 
 
-def band_of(recorded: Spectrum, home: Spectrum) -> Band:
+def band_of(recorded: Spectrum, home: Spectrum) -> SensorBand:
     """What a recording shows of movement like home's: the root of the ratio of both spectra, at most 1."""
     there, here = np.round(recorded.frequency, 5), np.round(home.frequency, 5)  # as a record holds them
     rows = np.isin(there, here) & (recorded.frequency > LEAST_FREQUENCY)
     frequency, density = recorded.frequency[rows], home.density[np.isin(here, there[rows])]
     with np.errstate(divide="ignore"):
         gain = np.sqrt(recorded.density[rows] / density)
-    return Band(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
+    return SensorBand(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
 
 
 RECORDED = "recorded_spectrum"

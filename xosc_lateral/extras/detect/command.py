@@ -16,7 +16,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import SimulationError, did_you_mean
 from xosc_lateral.extras.detect.detectors import RULES, Detector
-from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Measured, View, measure
+from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, SensedTrack, View, measure
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Scene
 
 ANSWER_TIME = 10.0
@@ -91,7 +91,7 @@ def _steps(scene: Scene, views: Sequence[View]) -> Iterator[tuple[dict[str, Any]
         yield line, (round(STEP * first, 3), instant)
 
 
-def _columns(track: LaneTrack, measured: Measured, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
+def _columns(track: LaneTrack, measured: SensedTrack, scene: Scene) -> tuple[dict[str, list[Any]], dict[str, Any]]:
     """Values of a track that change, as lists, and those that don't; what is not known is left out."""
     taken = measured.taken
     values: dict[str, Any] = {

@@ -12,7 +12,7 @@ from xosc_lateral.base.rates import rate
 from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW
 from xosc_lateral.drivers.evaluation.spectra import Spectrum
 from xosc_lateral.drivers.model.seeds import of_name
-from xosc_lateral.extras.detect.band import Band, band_of, keeping_spectrum
+from xosc_lateral.extras.detect.band import SensorBand, band_of, keeping_spectrum
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack, Rows, Scene, Truth, truth_of
 
 # Lateral speed is the change of position over the last `RATE_WINDOW`, lateral acceleration that of the lateral speed:
@@ -35,7 +35,7 @@ class Sensor:
     noise: float = 0.0  # standard deviation of each measured position, white [m]
     delay: float = 0.0  # until it is known [s]
     rate: float = 1.0 / STEP  # positions a second, held in between [Hz]
-    band: Band | None = None  # through which positions are seen; None: all that there is
+    band: SensorBand | None = None  # through which positions are seen; None: all that there is
 
     def taken(self, first: int, n: int) -> IntArray:
         """Row that is known at each of n rows from instant number `first` on; -1 before the first one. Shape (n,)."""
@@ -81,7 +81,7 @@ def read_numbers(text: str, limits: Mapping[str, tuple[float, float]], what: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Measured:
+class SensedTrack:
     """A track as the sensor gives it; arrays of shape (n,). What was not yet measured is as at the first moment."""
 
     taken: IntArray  # row that each row knows
@@ -90,7 +90,7 @@ class Measured:
     acceleration: FloatArray  # lateral, positive left [m/s2]
 
 
-def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measured:
+def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> SensedTrack:
     """What a sensor gives of a track."""
     taken = np.maximum(sensor.taken(track.first, len(track)), 0)
     position = track.lateral if sensor.band is None else sensor.band.seen(track.lateral)
@@ -98,7 +98,7 @@ def measure(track: LaneTrack, sensor: Sensor, rng: np.random.Generator) -> Measu
         position = position + sensor.noise * rng.standard_normal(len(track))
     lateral = position[taken]
     speed = rate(lateral, STEP, RATE_WINDOW, past=True)
-    return Measured(taken, lateral - track.base[taken], speed, rate(speed, STEP, RATE_WINDOW, past=True))
+    return SensedTrack(taken, lateral - track.base[taken], speed, rate(speed, STEP, RATE_WINDOW, past=True))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -120,7 +120,7 @@ class View:
     track: LaneTrack
     side: int  # of that lane: 1: left, -1: right
     truth: Truth
-    measured: Measured
+    measured: SensedTrack
     watched: BoolArray  # there is such a lane and, with an ego, the ego in it
     observer: Observer | None  # None: the source has no other vehicles
 

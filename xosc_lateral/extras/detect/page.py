@@ -13,7 +13,7 @@ from xosc_lateral.files.pages.chart import ENRICHED, color_of
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Html, Page
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, MovingTraffic
 
 LEAST_RATE = 0.1
 """False alarms below this are drawn there: the axis is logarithmic. [1/h]"""
@@ -180,7 +180,7 @@ def clip_scene(case: Case) -> str | None:
         *(track for track in case.scene.tracks if track is not watched and _is_near(track, instants, here)),
     ]
     entities = tuple(_motion(track, instants) for track in tracks)
-    return scene_of(Traffic(STEP, entities), network, names=_names(case))
+    return scene_of(MovingTraffic(STEP, entities), network, names=_names(case))
 
 
 def _names(case: Case) -> Sequence[str]:

@@ -20,7 +20,7 @@ from xosc_lateral.world.road.network import RoadNetwork
 
 STEP = 0.05
 """Of everything that a detector sees: the rate of 20 Hz at which radar and camera object lists come. [s]"""
-MAX_GAP = 1.0
+LONGEST_GAP = 1.0
 """Rows farther apart are not of one track, as in `recordings.cuts`. [s]"""
 MIN_DURATION = 5.0
 """Shorter tracks hold neither lane keeping nor a whole lane change, as in `recordings.cuts`. [s]"""
@@ -67,7 +67,7 @@ class Scene:
 def tracks_of(motion: EntityMotion, *, cluster: str, cuts: Sequence[int] = ()) -> Iterator[LaneTrack]:
     """Unbroken stretches of a vehicle in its lanes, at even instants; `cuts`: rows at which something else begins."""
     motion.validate("offset", "lane_width", "speed", "lane_index", "lane_count", "following")
-    for piece in motion.pieces(MAX_GAP, cuts):
+    for piece in motion.pieces(LONGEST_GAP, cuts):
         if len(piece) > 1 and piece.time[-1] - piece.time[0] >= MIN_DURATION:
             base, level = lane_levels(piece.offset, piece.lane_width)
             piece = piece.having(lateral=piece.offset + base, base=base, level=level)

@@ -10,7 +10,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.play import Scenario
-from xosc_lateral.cli.words import Options, Written, command, naming_option
+from xosc_lateral.cli.words import Options, Writing, command, naming_option
 
 # What is said of one option stays together.
 # fmt: off
@@ -33,7 +33,7 @@ def detect(
         help="Every threshold, with --like every cut-in: .csv, .csv.gz, .parquet.")] = None,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Page with curves and worst cases.")] = None,
     options: Annotated[Options, xl.detect],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Count false alarms in lane keeping, cut-ins seen and the time before the marking, source by source."""
     from xosc_lateral.files.atomic import together
@@ -59,7 +59,7 @@ def vary(
     scenario: Scenario, *,
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
     options: Annotated[Options, xl.vary],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Write variations of a scenario in which lane changes last as long as those of a profile's drivers.
 

@@ -8,7 +8,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Written, command
+from xosc_lateral.cli.words import Options, Writing, command
 
 # What is said of one option stays together.
 # fmt: off
@@ -27,7 +27,7 @@ def dossier(
     output: Annotated[str | None, typer.Option("--output", "-o", metavar="PAGE.html",
         help="Page; the same as JSON goes beside it.")] = None,
     options: Annotated[Options, xl.dossier],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Claims with tests and figures, validity, data, anomalies, tool classification; exit 1: a claim is broken."""
     result = xl.dossier(subject, **options)

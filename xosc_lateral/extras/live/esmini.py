@@ -20,7 +20,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.esmini_library import STATE, ObjectState, Player, StoryboardCallback
+from xosc_lateral.extras.live.esmini_library import STATE, EsminiLibrary, ObjectState, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest
 from xosc_lateral.extras.live.loop import Row
 from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
@@ -87,7 +87,7 @@ class EsminiTraffic:
         neighbours: Neighbours = Neighbours.BORROW,
         on_element: Callable[[bytes, int, int, bytes], None] | None = None,
     ) -> None:
-        self.player = library if isinstance(library, Player) else Player(library)
+        self.player = library if isinstance(library, EsminiLibrary) else EsminiLibrary(library)
         model = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
         self.entities = model.entities
         self.ego = UnderTest(ego, profiles or ())

@@ -57,7 +57,7 @@ OPTIONAL: dict[str, tuple[Any, ...]] = {
 """What is called where it is there."""
 
 
-class Player:
+class EsminiLibrary:
     """An esmini library, its functions by name; the types that a user has declared on them stay as they are."""
 
     def __init__(self, library: Any) -> None:
@@ -135,9 +135,9 @@ _UNTOUCHED_BYTE = 0xA5
 """A byte that nobody writes by chance at every place."""
 
 
-def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> Player:
+def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> EsminiLibrary:
     """A library that has opened a scenario; quiet, without a log file. Raises `SimulationError`: it can't."""
-    player = Player(library)
+    player = EsminiLibrary(library)
     if hasattr(player, "SE_SetLogFilePath"):
         player.SE_SetLogFilePath(b"")
     if hasattr(player, "SE_LogToConsole"):

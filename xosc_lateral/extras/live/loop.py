@@ -18,7 +18,7 @@ SAME_DURATION = 0.05
 """Two frames of a player at its slowest usual rate. [s]"""
 
 
-class Simulation(Protocol):
+class RunningSimulation(Protocol):
     """What runs, with drivers in it."""
 
     def time(self) -> float:
@@ -34,7 +34,7 @@ class Simulation(Protocol):
         """On by a step [s], everybody in it. Raises `SimulationError`: it can't."""
 
 
-def run_to_end(simulation: Simulation, end: float, step: float) -> list[Row]:
+def run_to_end(simulation: RunningSimulation, end: float, step: float) -> list[Row]:
     """Rows of all steps [s] until the end [s], or its own; the first are those of its start."""
     rows: list[Row] = []
     while True:

@@ -15,7 +15,7 @@ import numpy as np
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.track import KNOWN
 from xosc_lateral.files.opendrive.reader import read_opendrive
-from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, Traffic
+from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, MovingTraffic
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
@@ -46,7 +46,7 @@ class SimulatorScene:
     is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
 
 
-def motion_of(rows: pd.DataFrame, scene: SimulatorScene, network: RoadNetwork) -> Traffic:
+def motion_of(rows: pd.DataFrame, scene: SimulatorScene, network: RoadNetwork) -> MovingTraffic:
     """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
     times = np.unique(rows["time"])
     index = {name: k for k, name in enumerate(network.road_ids)}
@@ -73,7 +73,7 @@ def motion_of(rows: pd.DataFrame, scene: SimulatorScene, network: RoadNetwork) -
             columns[name][at] = values
         motions.append(EntityMotion.of(entity, times, **columns))
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
-    return Traffic(step, tuple(motions))
+    return MovingTraffic(step, tuple(motions))
 
 
 def sumo_entity(vehicles: Any, name: str) -> Entity:

@@ -19,7 +19,7 @@ from xosc_lateral.cli.words import (
     Quiet,
     Strict,
     Verbose,
-    Written,
+    Writing,
     command,
     refuse_warnings,
     say,
@@ -49,7 +49,7 @@ class Outputs:
     osi: Osi = None
     strict: Strict = False
 
-    def run(self, live: Callable[..., LiveRun], source: Path, reply: Written, **options: Any) -> None:
+    def run(self, live: Callable[..., LiveRun], source: Path, reply: Writing, **options: Any) -> None:
         """Run a simulation of that source, and write and say what came out."""
         from xosc_lateral.files.atomic import together
 
@@ -73,7 +73,7 @@ class Outputs:
 )
 def esmini(
     scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
-    *, options: Annotated[Options, xl.live_esmini], outputs: Outputs, reply: Written,
+    *, options: Annotated[Options, xl.live_esmini], outputs: Outputs, reply: Writing,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     outputs.run(xl.live_esmini, scenario, reply, **options)
@@ -87,7 +87,7 @@ def sumo(
     config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)], *,
     fcd_output: Annotated[Path | None, typer.Option(metavar="FCD.xml",
         help="SUMO's own output of where everybody was.")] = None,
-    options: Annotated[Options, xl.live_sumo], outputs: Outputs, reply: Written,
+    options: Annotated[Options, xl.live_sumo], outputs: Outputs, reply: Writing,
 ) -> None:
     """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
     words = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD_COLUMNS)

@@ -281,7 +281,7 @@ class Whitener:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class WhitenedRegression:
     """One linear regression, whitened: an ordinary one [4]_."""
 
     whitener: Whitener  # For series and columns.

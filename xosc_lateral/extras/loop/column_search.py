@@ -12,7 +12,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 from xosc_lateral.drivers.model.seeds import generator
-from xosc_lateral.extras.loop.autocorrelation import Problem
+from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
 from xosc_lateral.extras.loop.candidates import Family
 from xosc_lateral.extras.loop.dictionary import (
     CROSS_BASIS,
@@ -58,11 +58,11 @@ class SearchedTerm(ColumnTerm):
 
     @classmethod
     @abstractmethod
-    def problem(cls, fitted: Fitted) -> Problem:
+    def problem(cls, fitted: Fitted) -> WhitenedRegression:
         """Regression in which a column of this kind is tested, with the terms fitted already."""
 
     @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> WhitenedRegression | None:
         """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
         return None
 
@@ -85,7 +85,7 @@ class SearchedTerm(ColumnTerm):
 class _Scored:
     """All candidates, scored beside what is known."""
 
-    problem: Problem
+    problem: WhitenedRegression
     dictionary: Dictionary
     known: FloatArray  # shape (seconds, k), orthonormal
     alone: FloatArray  # shape (entries,): Squared score less cost, of products not beside their parts; -inf: barred.
@@ -207,7 +207,7 @@ class ColumnSearch:
         # the second of two looks
         return plain[best], min(1.0, 2.0 * upper_tail(explained[best, 0], explained[:, 1:].max(axis=0)))
 
-    def limits(self, level: float) -> tuple[Problem, FloatArray, float] | None:
+    def limits(self, level: float) -> tuple[WhitenedRegression, FloatArray, float] | None:
         """Regression, what is known in it (white, orthonormal), and the score whose p-value is a level; None: empty."""
         scored = self._scored_once()
         return None if scored is None else (scored.problem, scored.known, score_at(level, scored.maxima))
@@ -229,7 +229,7 @@ class ColumnSearch:
 
     def _scored(
         self,
-        problem: Problem,
+        problem: WhitenedRegression,
         dictionary: Dictionary | None = None,
         refused: Collection[tuple[str, ...]] = (),
         *,

@@ -16,7 +16,7 @@ from msgspec import structs
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.model.effects import ColumnEffect, Product
 from xosc_lateral.drivers.model.effects.shapes import Form
-from xosc_lateral.extras.loop.autocorrelation import Problem
+from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
 from xosc_lateral.extras.loop.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.extras.loop.columns import Column
 from xosc_lateral.extras.loop.dictionary import beside, of_unit_variance, orthonormal
@@ -56,7 +56,9 @@ class Refined:
 class Refinement:
     """Scores many effects at once beside all that is `known` (orthonormal, shape (seconds, k))."""
 
-    def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, costs: Mapping[Family, float]) -> None:
+    def __init__(
+        self, coarse: Coarse, problem: WhitenedRegression, known: FloatArray, costs: Mapping[Family, float]
+    ) -> None:
         self._coarse, self._problem, self._costs = coarse, problem, costs
         self._basis = known.astype(np.float32)
         self._left = of_unit_variance(beside(known, problem.observed))

@@ -14,7 +14,7 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Tables, Written, command, say
+from xosc_lateral.cli.words import Options, Tables, Writing, command, say
 
 # What is said of one option stays together.
 # fmt: off
@@ -66,7 +66,7 @@ def close_loop(
     plan: Annotated[bool, typer.Option("--plan",
         help="Say what these drives can show, and seek no effect; nothing is written.")] = False,
     options: Annotated[Options, xl.close_loop],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Find what a profile fails to reproduce, trace it to effects, add them, and score the result on held-out data."""
     from xosc_lateral.extras.loop.call import ClosedLoop

@@ -18,7 +18,7 @@ TRIGGER_TOLERANCE = 0.2  # so near to the recorded moment the trigger has to com
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class OtherVehicle:
     """Another vehicle at a moment: free space between bumpers [m], and time until it is used up [s], inf: never."""
 
     name: str
@@ -34,8 +34,8 @@ class Encounter:
     vehicle: str
     time: float  # when it begins; of a lane change, when the vehicle is half way [s]
     side: str  # "left", "right"; empty of a braking
-    ahead: Beside | None
-    behind: Beside | None
+    ahead: OtherVehicle | None
+    behind: OtherVehicle | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +84,20 @@ def _at(plan: VehiclePlan, time: float) -> At | None:
 
 def _beside(
     plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, lanes: RoadLanes, lane: int | None = None
-) -> list[Beside | None]:
+) -> list[OtherVehicle | None]:
     """Nearest vehicle ahead and behind in a lane of its road; None: the lane that it is in."""
     there = [(one, at) for one in plans if (at := _at(one, time)) is not None]
     number = next((k for k, (one, _) in enumerate(there) if one is plan), None)
     if number is None:
         return [None, None]
-    beside, speed, now = list[Beside | None](), float(plan.speed.at(np.array([time]))[0]), np.array([time])
+    beside, speed, now = list[OtherVehicle | None](), float(plan.speed.at(np.array([time]))[0]), np.array([time])
     for known, ahead in zip(lanes.nearest([at for _, at in there], number, lane), (1.0, -1.0), strict=True):
         if known is None or known[1] > ENCOUNTER_DISTANCE:
             beside.append(None)
             continue
         other, gap = there[known[0]][0], known[1]
         closing = (speed - float(other.speed.at(now)[0])) * ahead
-        beside.append(Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf))
+        beside.append(OtherVehicle(other.name, gap, gap / closing if closing > 1e-3 else np.inf))
     return beside
 
 
@@ -122,7 +122,7 @@ def relative_triggers(plan: VehiclePlan, plans: Sequence[VehiclePlan], lanes: Ro
 
 
 def _trigger(
-    plan: VehiclePlan, beside: Beside | None, plans: Sequence[VehiclePlan], time: float
+    plan: VehiclePlan, beside: OtherVehicle | None, plans: Sequence[VehiclePlan], time: float
 ) -> RelativeTrigger | None:
     """The distance to another vehicle as a trigger, if it passes its value at that time and not in a while before."""
     other = next((other for other in plans if beside is not None and other.name == beside.name), None)

@@ -12,12 +12,12 @@ from typer.core import TyperGroup
 
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
-from xosc_lateral.cli.words import Options, Written, command, pairs, with_options, write_stdout
+from xosc_lateral.cli.words import Options, Writing, command, pairs, with_options, write_stdout
 from xosc_lateral.extras.recordings.importers import GROUP, IMPORTERS, find_importer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Table(Written):
+class _Table(Writing):
     """Options of all formats: the table to write."""
 
     output: Annotated[

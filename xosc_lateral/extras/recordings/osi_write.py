@@ -20,7 +20,7 @@ from xosc_lateral.base.version import __version__
 from xosc_lateral.extras.recordings.osi_lanes import RoadIds, write_lanes
 from xosc_lateral.files.atomic import replace_atomically
 from xosc_lateral.files.osi import SUFFIXES, osi
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic, axes
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, MovingTraffic, axes
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
@@ -53,7 +53,7 @@ running lights, and no words for a light of the user's own."""
 
 def write_osi(
     path: Path,
-    motion: Traffic,
+    motion: MovingTraffic,
     network: RoadNetwork,
     trajectories: Sequence[Track] | None = None,
     *,
@@ -104,7 +104,7 @@ def _save(path: Path, messages: Iterator[Any], description: str) -> None:
 
 
 def ground_truths(
-    motion: Traffic,
+    motion: MovingTraffic,
     network: RoadNetwork,
     trajectories: Sequence[Track] | None = None,
     *,
@@ -204,7 +204,7 @@ def _rate(values: FloatArray, motion: EntityMotion) -> FloatArray:
     return rates
 
 
-def _lights(motion: Traffic, entity: EntityMotion) -> list[tuple[float, Any]]:
+def _lights(motion: MovingTraffic, entity: EntityMotion) -> list[tuple[float, Any]]:
     """States of a vehicle's lights, in the order of time; what the scenario says nothing of stays unset."""
     kinds = osi("osi3.osi_object_pb2").MovingObject.VehicleClassification
     state, states_over_time = kinds.LightState(), []

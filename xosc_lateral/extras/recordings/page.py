@@ -18,7 +18,7 @@ from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
 from xosc_lateral.workflows.conversion.result import EntityResult, SampledSegment
 from xosc_lateral.workflows.playing.scene import scene_of
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, MovingTraffic
 from xosc_lateral.world.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.world.road.network import RoadNetwork
 
@@ -108,7 +108,7 @@ def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) 
         shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
         motions.append(motion)
         results.append(EntityResult(motion, (), None, "", (shown,), deviation, path))
-    return scene_of(Traffic(FRAME, tuple(motions)), network, results)
+    return scene_of(MovingTraffic(FRAME, tuple(motions)), network, results)
 
 
 def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:

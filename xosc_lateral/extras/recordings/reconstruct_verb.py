@@ -9,7 +9,7 @@ import typer
 
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Options, Written, command
+from xosc_lateral.cli.words import Mapped, Options, Writing, command
 from xosc_lateral.extras.recordings.settings import ReconstructSettings
 
 # What is said of one option stays together.
@@ -29,7 +29,7 @@ def reconstruct(
     output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
     mapped: Mapped,
     settings: Annotated[Options, ReconstructSettings],
-    reply: Written,
+    reply: Writing,
 ) -> None:
     """Turn a recording into maneuvers, its road, and the drivers who drove."""
     reply.say(xl.reconstruct(recording, output, columns=mapped.mapping(), **settings, force=reply.force))

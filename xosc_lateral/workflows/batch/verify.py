@@ -31,7 +31,7 @@ from xosc_lateral.workflows.options import declare_options, flag, process_count
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths
 
 
-class Problem(StrEnum):
+class Reason(StrEnum):
     """Why an output does not hold."""
 
     MISSING = "missing"
@@ -44,7 +44,7 @@ class Problem(StrEnum):
     DIFFERS = "differs"
 
 
-Defect = tuple[Problem, str]
+Defect = tuple[Reason, str]
 """What is wrong with an output, and in words."""
 
 
@@ -168,7 +168,7 @@ def verify(
     with open_pool(min(workers, len(tasks)), None, JobLimits()) as pool:
         for (number, task), defects in run_tasks(pool, partial(_defects, search, fast), tasks):
             if isinstance(defects, WorkerDiedError):
-                defects = [(Problem.FAILED, str(defects))]
+                defects = [(Reason.FAILED, str(defects))]
             checked[number] = Checked(task.path, tuple(defects))
     done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
     return Verification(tuple(checked[number] for number, _ in tasks), done)
@@ -191,11 +191,11 @@ def _tasks(outputs: Sequence[Path]) -> Iterator[_Task]:
             continue
         named = {path_below(folder, row.output, "output"): row for row in _rows(folder)}
         for output, row in named.items():
-            yield _Task(output, row, None if output.exists() else (Problem.MISSING, "is gone"))
+            yield _Task(output, row, None if output.exists() else (Reason.MISSING, "is gone"))
         for output in sorted(folder.rglob("*.xosc")):
             folders = output.parents[: len(output.relative_to(folder).parts) - 1]
             if output not in named and not any((inner / MANIFEST).exists() for inner in folders):
-                yield _Task(output, None, (Problem.FOREIGN, "is not in the manifest"))
+                yield _Task(output, None, (Reason.FOREIGN, "is not in the manifest"))
 
 
 def _rows(folder: Path) -> Iterator[ManifestRow]:
@@ -212,7 +212,7 @@ def _defects(search: ConvertSettings, fast: bool, numbered: tuple[int, _Task]) -
     try:
         return within_limits(partial(_check, search, fast), task, JobLimits())
     except (XoscLateralError, OSError) as error:
-        return [(Problem.FAILED, " ".join(cut(str(error)).split()))]
+        return [(Reason.FAILED, " ".join(cut(str(error)).split()))]
 
 
 def _check(search: ConvertSettings, fast: bool, task: _Task) -> list[Defect]:
@@ -220,10 +220,10 @@ def _check(search: ConvertSettings, fast: bool, task: _Task) -> list[Defect]:
     try:
         origin = _Origin.of(task.path, data, search)
     except FormatError as error:
-        return [(Problem.FOREIGN, error.what)]
+        return [(Reason.FOREIGN, error.what)]
     defects = _changes(data, origin)
     if task.row is not None and not defects and (others := list(_other_row(task.row, data, origin))):
-        defects.append((Problem.EDITED, f"the manifest states another {', '.join(others)}"))
+        defects.append((Reason.EDITED, f"the manifest states another {', '.join(others)}"))
     return defects if defects or fast else _made_otherwise(task.path, data, origin)
 
 
@@ -247,11 +247,11 @@ def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
     same = without_provenance(made) == without_provenance(data)
-    problems = [] if same else [(Problem.DIFFERS, "another content comes out of what its provenance states")]
+    problems = [] if same else [(Reason.DIFFERS, "another content comes out of what its provenance states")]
     names = sorted(name for name in stated.keys() | now.keys() if stated.get(name) != now.get(name))
     names = [name for name in names if name not in (CONTENT_HASH_NAME, "package_version")]
-    problems += [(Problem.EDITED, f"its provenance states another {name}") for name in names]
-    return problems or [(Problem.EDITED, "its provenance is not as it was written")]
+    problems += [(Reason.EDITED, f"its provenance states another {name}") for name in names]
+    return problems or [(Reason.EDITED, "its provenance is not as it was written")]
 
 
 def _version_of(facts: Mapping[str, Any]) -> bytes:
@@ -263,26 +263,26 @@ def _changes(data: bytes, origin: _Origin) -> list[Defect]:
     """What was edited in an output, and what would come out otherwise today, and why."""
     facts, problems = origin.facts, list[Defect]()
     if facts.get(CONTENT_HASH_NAME) != content_hash(data):
-        problems.append((Problem.EDITED, "its content is not what was written"))
+        problems.append((Reason.EDITED, "its content is not what was written"))
     if facts.get("behaviour") != BEHAVIOUR:
         made = f"behaviour {facts.get('behaviour')} of version {facts.get('package_version')}"
-        problems.append((Problem.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"))
+        problems.append((Reason.VERSION, f"made by {made}; this program has behaviour {BEHAVIOUR}"))
     for name, sha256 in facts["inputs"].items():
         try:
             if file_hash(Path(os.path.normpath(origin.scenario.parent / name))) != sha256:
-                problems.append((Problem.INPUT, f"{cut(name)} has changed"))
+                problems.append((Reason.INPUT, f"{cut(name)} has changed"))
         except (OSError, FormatError, ValueError):
-            problems.append((Problem.INPUT, f"{cut(name)} is gone"))
+            problems.append((Reason.INPUT, f"{cut(name)} is gone"))
     settings = origin.settings
     for entity, recorded in sorted((str(entity), profile) for entity, profile in facts["profiles"].items()):
         named = settings.entity.get(entity, settings.profile)
         try:
             profile = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
         except (XoscLateralError, OSError) as error:
-            problems.append((Problem.PROFILE, f"profile of {cut(entity)!r}: {cut(str(error))}"))
+            problems.append((Reason.PROFILE, f"profile of {cut(entity)!r}: {cut(str(error))}"))
             continue
         if not isinstance(recorded, list) or recorded[1:] != [profile_hash(profile)]:
-            problems.append((Problem.PROFILE, f"profile {profile.name!r} of {cut(entity)!r} has changed"))
+            problems.append((Reason.PROFILE, f"profile {profile.name!r} of {cut(entity)!r} has changed"))
     return problems
 
 
@@ -345,7 +345,7 @@ def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers:
         try:
             origin = _Origin.of(old, read_source(old).data, search)
         except (FormatError, OSError) as error:
-            yield Checked(old, ((Problem.FAILED, str(error)),))
+            yield Checked(old, ((Reason.FAILED, str(error)),))
             continue
         origins[row.output] = origin
         below, source = Path(row.scenario).parts, origin.scenario
@@ -367,7 +367,7 @@ def _reproduce_folder(folder: Path, new: Path, search: ConvertSettings, workers:
     for outcome in convert_many(batch, workers=workers):
         name = outcome.row.output
         if outcome.row.error:
-            yield Checked(folder / name, ((Problem.FAILED, outcome.row.error),))
+            yield Checked(folder / name, ((Reason.FAILED, outcome.row.error),))
         else:
             yield _compared(folder / name, new / name, origins[name])
 
@@ -381,7 +381,7 @@ def _compared(old: Path, new: Path, origin: _Origin) -> Checked:
     ):
         return Checked(old)
     why = tuple(_changes(old.read_bytes(), origin))
-    return Checked(old, why or ((Problem.DIFFERS, "another content comes out, and nothing says why"),))
+    return Checked(old, why or ((Reason.DIFFERS, "another content comes out, and nothing says why"),))
 
 
 def _parts(path: Path) -> list[bytes]:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from xosc_lateral.files.held import Held
     from xosc_lateral.files.pages.figure import Figure
     from xosc_lateral.workflows.conversion.load import Played
-    from xosc_lateral.world.motion.nominal import Traffic
+    from xosc_lateral.world.motion.nominal import MovingTraffic
     from xosc_lateral.world.motion.segments import SegmentRow
 
 
@@ -214,7 +214,7 @@ class Playback(Result):
 
         return facts_in(self._played.scenario.source)
 
-    def _as_written(self) -> Traffic | None:
+    def _as_written(self) -> MovingTraffic | None:
         """The run of the scenario that this one was made from, where its source lies beside it as it was then."""
         from xosc_lateral.files.openscenario.read import RoadSearch
         from xosc_lateral.workflows.conversion.load import play_scenario

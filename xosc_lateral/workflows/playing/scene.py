@@ -14,7 +14,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.conversion.result import EntityResult
-from xosc_lateral.world.motion.nominal import Activity, EntityMotion, Traffic
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, MovingTraffic
 from xosc_lateral.world.road.geometry import simplify
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
@@ -56,7 +56,7 @@ class Remade(NamedTuple):
     is_enriched: bool
 
 
-def remade(written: Traffic, made: Traffic, moved: Collection[str]) -> list[Remade]:
+def remade(written: MovingTraffic, made: MovingTraffic, moved: Collection[str]) -> list[Remade]:
     """Vehicles of both runs for as long as both last; `moved`: who has lateral movement."""
     outputs = {entity.name: entity for entity in made.entities}
     both = [(entity, outputs[entity.name]) for entity in written.entities if entity.name in outputs]
@@ -70,7 +70,11 @@ def remade(written: Traffic, made: Traffic, moved: Collection[str]) -> list[Rema
 
 
 def scene_of(
-    motion: Traffic, network: RoadNetwork, results: Sequence[EntityResult | Remade] = (), *, names: Sequence[str] = ()
+    motion: MovingTraffic,
+    network: RoadNetwork,
+    results: Sequence[EntityResult | Remade] = (),
+    *,
+    names: Sequence[str] = (),
 ) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone.
 

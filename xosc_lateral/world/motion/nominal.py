@@ -126,7 +126,7 @@ CUT_OFF = "still runs at the time limit"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Traffic:
+class MovingTraffic:
     """Whatever moves, on one clock: played, recorded, or run by somebody else."""
 
     step: float  # [s]
@@ -135,7 +135,7 @@ class Traffic:
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)
-class NominalMotion(Traffic):
+class NominalMotion(MovingTraffic):
     """A played scenario."""
 
     end_time: float  # [s]

@@ -44,7 +44,7 @@ STANDSTILL_TIME = 0.3
 """A shorter stop is driven through, unless the piece begins or ends with it. [s]"""
 
 
-class PathPiece(Struct, frozen=True):
+class RowStretch(Struct, frozen=True):
     """A stretch of rows without a stop."""
 
     first: int  # rows, both included; equal: the entity is only placed there
@@ -53,7 +53,7 @@ class PathPiece(Struct, frozen=True):
     stops: bool  # the entity stands when it is over
 
 
-def cut_path(time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> list[PathPiece]:
+def cut_path(time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[np.uint8]) -> list[RowStretch]:
     """Pieces of one entity's path, in order, from its rows, shape (n,): [s], [m], `Activity` bits."""
 
     def active(rows: slice) -> BoolArray:
@@ -62,7 +62,7 @@ def cut_path(time: FloatArray, x: FloatArray, y: FloatArray, activity: NDArray[n
     def teleported(rows: slice) -> BoolArray:
         return np.asarray((activity[rows] & Activity.TELEPORTED) != 0)
 
-    pieces: list[PathPiece] = []
+    pieces: list[RowStretch] = []
     for part in slices_where(len(time), active):
         cuts = [part.start, *rows_where(part.stop, teleported, part.start + 1).tolist(), part.stop]
         for begin, end in pairwise(cuts):
@@ -185,17 +185,17 @@ def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
 
 def _cut_at_stops(
     time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool
-) -> list[PathPiece]:
+) -> list[RowStretch]:
     """Pieces between the stops and turns backwards inside rows first..last, which hold no jump."""
     stops = _stops(time, x, y, first, last)
     pieces = []
     begin = first
     for stop_begin, stop_end in stops:
         if stop_begin > begin or (begin == first and placed):
-            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=stop_end > stop_begin))
+            pieces.append(RowStretch(begin, stop_begin, placed and begin == first, stops=stop_end > stop_begin))
         begin = stop_end
     if begin < last or (begin == first and placed):
-        pieces.append(PathPiece(begin, last, placed and begin == first, stops=False))
+        pieces.append(RowStretch(begin, last, placed and begin == first, stops=False))
     return pieces
 
 

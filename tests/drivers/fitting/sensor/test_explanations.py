@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.drivers.fitting.sensor.test_likelihood import COLOURED, driver_density, measured
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Measured
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, SensorData
 from xosc_lateral.drivers.fitting.sensor.periodogram import Periodogram
 from xosc_lateral.drivers.fitting.sensor.separation import explanations
 
 
 def best_of(data: Periodogram):  # type: ignore[no-untyped-def]
-    return min(explanations(Measured(data, np.zeros(len(data.frequency)))), key=lambda one: one.criterion)
+    return min(explanations(SensorData(data, np.zeros(len(data.frequency)))), key=lambda one: one.criterion)
 
 
 @pytest.mark.parametrize(("order", "corner"), [(1, 0.32), (1, 0.92), (2, 0.51)])

@@ -13,7 +13,7 @@ from xosc_lateral.drivers.fitting.sensor.likelihood import (
     N_KNOTS,
     Colour,
     Known,
-    Measured,
+    SensorData,
     _Problem,
     density,
     interpolation,
@@ -50,7 +50,7 @@ def test_the_integral_is_that_of_the_shape(order: int, corner: float) -> None:
 @pytest.mark.parametrize("colour", [Colour(), Colour(2, CORNER)])
 def test_gradient_and_information_are_those_of_the_loss(colour: Colour) -> None:
     data = measured(colour if colour.order else None)
-    problem = _Problem(Measured(data, np.zeros(90)), colour)
+    problem = _Problem(SensorData(data, np.zeros(90)), colour)
     point = problem.start() + 0.1 * np.random.default_rng(1).normal(size=problem.size)
     loss, gradient, information = problem.at(point)
     numeric = approx_fprime(point, lambda p: problem.at(p)[0], 1e-6)
@@ -61,7 +61,7 @@ def test_gradient_and_information_are_those_of_the_loss(colour: Colour) -> None:
 
 def test_a_driver_and_a_white_floor_come_apart() -> None:
     data = measured()
-    found = solve(Measured(data, np.zeros(90)), Colour())
+    found = solve(SensorData(data, np.zeros(90)), Colour())
     assert np.exp(found.white) == pytest.approx(WHITE, rel=0.1)
     assert found.colour == -np.inf
     slow = data.frequency < 0.3
@@ -75,15 +75,15 @@ def test_of_an_error_that_is_known_rounding_has_its_part() -> None:
     data, rate = measured(weight=20.0), 20.0
     noise, level = 0.5 * WHITE * 0.5 * rate, np.full(90, 0.5 * WHITE)
     known = Known(float(np.sqrt(2.0 * noise)), rate, rounding=noise)
-    found = solve(Measured(data, level, known), Colour())
+    found = solve(SensorData(data, level, known), Colour())
     assert np.exp(found.white) == pytest.approx(0.5 * WHITE, rel=0.02)
-    counted_twice = solve(Measured(data, level, Known(known.deviation, rate)), Colour())
+    counted_twice = solve(SensorData(data, level, Known(known.deviation, rate)), Colour())
     assert np.exp(counted_twice.white) > 0.7 * WHITE
 
 
 def test_a_coloured_part_comes_apart_too() -> None:
     colour = Colour(2, CORNER)
-    found = solve(Measured(measured(colour, weight=2000.0), np.zeros(90)), colour)
+    found = solve(SensorData(measured(colour, weight=2000.0), np.zeros(90)), colour)
     assert np.exp(found.colour) == pytest.approx(COLOURED, rel=0.3)
 
 
@@ -97,7 +97,7 @@ def test_how_a_driver_goes_on_below_the_noise_is_told_by_where_his_spectrum_turn
         return shape * corner * WHITE  # half the noise's at the corner
 
     data = Periodogram(frequency, true(frequency) + WHITE, np.full(90, 400.0))
-    found = solve(Measured(data, np.zeros(90)), Colour())
+    found = solve(SensorData(data, np.zeros(90)), Colour())
     fine = np.linspace(0.02, 2.5, 2000)
     accelerations = [float((fine**4 * one).sum()) for one in (density(found.knots, fine), true(fine))]
     assert np.sqrt(accelerations[0] / accelerations[1]) == pytest.approx(1.0, abs=0.15)
@@ -105,28 +105,28 @@ def test_how_a_driver_goes_on_below_the_noise_is_told_by_where_his_spectrum_turn
 
 def test_beside_a_low_passed_error_the_corner_is_not_looked_for() -> None:
     colour = Colour(2, CORNER)
-    found = solve(Measured(measured(colour, weight=2000.0), np.zeros(90)), colour)
+    found = solve(SensorData(measured(colour, weight=2000.0), np.zeros(90)), colour)
     assert found.state[N_KNOTS] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_floor_that_is_known_already_is_not_found_again() -> None:
     data = measured()
-    found = solve(Measured(data, np.full(90, 0.9 * WHITE)), Colour())
+    found = solve(SensorData(data, np.full(90, 0.9 * WHITE)), Colour())
     assert np.exp(found.white) < 0.3 * WHITE
 
 
 def test_a_noise_level_that_is_known_is_kept_to() -> None:
     rate, deviation = 25.0, 0.02  # five times what the floor alone would be
-    found = solve(Measured(measured(weight=5.0), np.zeros(90), Known(deviation, rate)), Colour())
-    free = solve(Measured(measured(weight=5.0), np.zeros(90)), Colour())
+    found = solve(SensorData(measured(weight=5.0), np.zeros(90), Known(deviation, rate)), Colour())
+    free = solve(SensorData(measured(weight=5.0), np.zeros(90)), Colour())
     assert np.exp(found.white) * 0.5 * rate == pytest.approx(deviation**2, rel=0.2)
     assert found.white > free.white
 
 
 def test_going_on_from_a_solution_finds_it_again() -> None:
     data = measured()
-    first = solve(Measured(data, np.zeros(90)), Colour())
-    again = solve(Measured(data, np.zeros(90)), Colour(), start=first)
+    first = solve(SensorData(data, np.zeros(90)), Colour())
+    again = solve(SensorData(data, np.zeros(90)), Colour(), start=first)
     assert again.loss == pytest.approx(first.loss, abs=1e-2)
     assert again.white == pytest.approx(first.white, abs=0.01)
 

@@ -213,7 +213,7 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Measured:
+class SensorData:
     """What driver and sensor are to explain."""
 
     data: Periodogram
@@ -224,7 +224,7 @@ class Measured:
 class _Problem:
     """Loss, gradient and Fisher information at a point (state, white, colour)."""
 
-    def __init__(self, measured: Measured, colour: Colour) -> None:
+    def __init__(self, measured: SensorData, colour: Colour) -> None:
         data, known = measured.data, measured.known
         self.data, self.base, self.known = data, measured.base, known
         self.matrix = interpolation(data.frequency)
@@ -303,7 +303,7 @@ class _Problem:
         return rows
 
 
-def solve(measured: Measured, colour: Colour, start: Solution | None = None) -> Solution:
+def solve(measured: SensorData, colour: Colour, start: Solution | None = None) -> Solution:
     """Most likely driver and sensor for a given colour of the sensor, climbed to from one of the same colour."""
     problem = _Problem(measured, colour)
     point = problem.start() if start is None else np.array([*start.state, start.white, start.colour])[: problem.size]

@@ -19,7 +19,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
 from xosc_lateral.drivers.drives.filters import mirrored, scale_frequencies
-from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, Measured, Solution, density, solve
+from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, SensorData, Solution, density, solve
 from xosc_lateral.drivers.fitting.sensor.periodogram import (
     COARSE_STEP_RATIO,
     LEVEL_SD,
@@ -121,7 +121,7 @@ def separate(
     if is_rounded:
         rounding, rounded_off = _rounding(data, grain, variance, per_second), uniform_variance(grain)
     known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
-    asked = Measured(data, rounding(data.frequency), known)
+    asked = SensorData(data, rounding(data.frequency), known)
     view = second_view(half_widths, step) if half_widths else None
     candidates = explanations(asked, view, only_view=one_camera)
     least = _taken(candidates)
@@ -189,7 +189,7 @@ def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> 
     level = 2.0 * error / rate  # white, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):
-        solution = solve(Measured(data, shape(data.frequency)), Colour())
+        solution = solve(SensorData(data, shape(data.frequency)), Colour())
         noise = min(0.5 * float(np.exp(solution.white)) * rate, MOST_NOISE * (variance - error))
         spectrum = partial(density, solution.knots)
         shape = rounding_density(grain, spectrum, variance - error - noise, rate=rate, noise=noise)
@@ -220,7 +220,7 @@ def _interval(
     of_windows: Callable[[FloatArray], Periodogram],
     windows: FloatArray,
     taken: Explanation,
-    measured: Measured,
+    measured: SensorData,
     plausible: Sequence[tuple[Solution, Colour]],
     share: float,
 ) -> tuple[float, float]:
@@ -269,7 +269,7 @@ class Explanation:
     criterion: float
 
 
-def explanations(measured: Measured, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
+def explanations(measured: SensorData, view: SecondView | None = None, *, only_view: bool = False) -> list[Explanation]:
     """All that were tried; of a second view, also or only what it shows.
 
     A low-passed sensor needs no white noise beside it, and a white level that is there to spare lets a steeper low-pass
@@ -287,7 +287,7 @@ def explanations(measured: Measured, view: SecondView | None = None, *, only_vie
     return candidates
 
 
-def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanation]:
+def _of_family(measured: SensorData, order: int, alone: bool) -> Iterator[Explanation]:
     """Over a grid of corners, and between the neighbours of the best."""
     from scipy.optimize import minimize_scalar
 
@@ -309,7 +309,7 @@ def _of_family(measured: Measured, order: int, alone: bool) -> Iterator[Explanat
     yield from tried
 
 
-def _explanation(measured: Measured, colour: Colour, start: Solution | None = None) -> Explanation:
+def _explanation(measured: SensorData, colour: Colour, start: Solution | None = None) -> Explanation:
     """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for.
 
     A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a

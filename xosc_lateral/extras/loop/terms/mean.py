@@ -22,7 +22,7 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect, Product, Proximity
 from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop import refinement
-from xosc_lateral.extras.loop.autocorrelation import Problem
+from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
 from xosc_lateral.extras.loop.candidates import shapes_of
 from xosc_lateral.extras.loop.column_search import SearchedTerm, grows
 from xosc_lateral.extras.loop.columns import Column, read_column
@@ -69,14 +69,14 @@ class MeanTerm(SearchedTerm):
         return bool(later.scale_columns(coarse).shape[1]) or later.known_scale(coarse) is not None
 
     @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
+    def problem(cls, fitted: Fitted) -> WhitenedRegression:
         """Whitened offsets."""
-        return Problem(fitted.whitener, fitted.coarse.offset, fitted.columns)
+        return WhitenedRegression(fitted.whitener, fitted.coarse.offset, fitted.columns)
 
     @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem:
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> WhitenedRegression:
         """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
-        return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
+        return WhitenedRegression(after.whitener, fitted.coarse.offset, fitted.columns)
 
     def matches(self, other: Term) -> bool:
         """Whatever its course over time."""

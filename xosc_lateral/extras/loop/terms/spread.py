@@ -16,7 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.extras.loop.autocorrelation import Problem, Whitener, fit_autoregression, moving_sum
+from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression, Whitener, fit_autoregression, moving_sum
 from xosc_lateral.extras.loop.column_search import ColumnSearch, SearchedTerm
 from xosc_lateral.extras.loop.dictionary import Search
 from xosc_lateral.extras.loop.model import CLIP, Fitted, Stage, own_levels
@@ -48,7 +48,7 @@ class SpreadTerm(SearchedTerm):
         return self.bounded(coarse)
 
     @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
+    def problem(cls, fitted: Fitted) -> WhitenedRegression:
         """Squared innovations."""
         return of_squares(fitted.coarse, quick_squares(fitted), known_log_scale(fitted))
 
@@ -104,7 +104,7 @@ class SlowSpreadTerm(SpreadTerm):
         return self.bounded(coarse)
 
     @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
+    def problem(cls, fitted: Fitted) -> WhitenedRegression:
         """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
         coarse = fitted.coarse
         moved = [np.abs(coarse.response(term.effect, keep=True)) for term in of_kind(fitted, MeanTerm)]
@@ -130,7 +130,7 @@ class FineNoiseTerm(SearchedTerm):
     what: ClassVar[str] = "fine noise"
 
     @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
+    def problem(cls, fitted: Fitted) -> WhitenedRegression:
         """Squared innovations at 5 Hz, beside size and rate of effects on the mean, which are followed with errors."""
         coarse = fitted.coarse
         fine = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, cls)]
@@ -205,7 +205,7 @@ def slow_squares(fitted: Fitted) -> Squares:
     return Squares(np.where(whole, np.square(sums / max(deviation, 1e-12)), 0.0), whole)
 
 
-def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem:
+def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> WhitenedRegression:
     """Regression of squares on columns, shape (n, k), that may make them larger.
 
     Squares come in clusters of seconds, which whitening takes out. Loud and quiet minutes it leaves: they are what a
@@ -218,7 +218,7 @@ def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem
         design = columns - columns[valid].mean(axis=0)
         left = series - design @ np.linalg.lstsq(design[valid], series[valid], rcond=None)[0]
     process = fit_autoregression(np.where(valid, left, 0.0), valid, SQUARES_S, longest=SQUARES_S)
-    return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), series, columns)
+    return WhitenedRegression(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), series, columns)
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:

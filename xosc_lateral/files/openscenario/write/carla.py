@@ -37,7 +37,7 @@ from xosc_lateral.files.openscenario.write.losses import Losses, remove
 from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, wrapped
 from xosc_lateral.files.openscenario.write.older import add_missing_overrides
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
-from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
+from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, RowStretch, vertex_times
 from xosc_lateral.world.scenario.controllers import is_named_under_test
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, Priority
@@ -92,8 +92,8 @@ def _of_rows(columns: Sequence[FloatArray], part: slice) -> list[FloatArray]:
     return [values[part] for values in columns]
 
 
-def _drives(pieces: Sequence[PathPiece]) -> list[list[PathPiece]]:
-    drives: list[list[PathPiece]] = []
+def _drives(pieces: Sequence[RowStretch]) -> list[list[RowStretch]]:
+    drives: list[list[RowStretch]] = []
     for piece in pieces:
         if piece.placed or not drives:
             drives.append([])
@@ -101,7 +101,7 @@ def _drives(pieces: Sequence[PathPiece]) -> list[list[PathPiece]]:
     return drives
 
 
-def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[FloatArray, list[FloatArray]]:
+def _vertices(item: Moving, pieces: Sequence[RowStretch], begin: float) -> tuple[FloatArray, list[FloatArray]]:
     """Times from the drive's start and x, y, z, h, p, r of its vertices. [s], [m], [rad]"""
     path = item.path
     moments = _moments(item, pieces, begin)
@@ -118,7 +118,7 @@ def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[
     return moments - begin, columns
 
 
-def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatArray:
+def _moments(item: Moving, pieces: Sequence[RowStretch], begin: float) -> FloatArray:
     """Times of the vertices, amid frames, from `begin` on. [s]"""
     path, times = item.path, [begin]
     for piece in pieces:

@@ -19,7 +19,7 @@ from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion, Nomi
 from xosc_lateral.world.motion.path_pieces import (
     LEAST_SPACING,
     VERTEX_SPACING,
-    PathPiece,
+    RowStretch,
     cut_path,
     vertex_times,
 )
@@ -67,7 +67,7 @@ class Moving:
         arrays = (path.x[rows], path.y[rows], path.z[rows], _unwrapped(path.heading[rows]), path.pitch[rows])
         return [np.interp(moments, path.time[rows], values) for values in (*arrays, path.roll[rows])]
 
-    def trigger_time(self, piece: PathPiece) -> float:
+    def trigger_time(self, piece: RowStretch) -> float:
         """When a piece has to begin: being placed anew happens in the step before its first row."""
         return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
@@ -90,7 +90,7 @@ def _mirrored(path: Track) -> Track:
     return path.having(y=y, heading=heading, pitch=pitch)
 
 
-def _stopping_in_time(path: Track, pieces: Sequence[PathPiece]) -> tuple[Track, list[PathPiece]]:
+def _stopping_in_time(path: Track, pieces: Sequence[RowStretch]) -> tuple[Track, list[RowStretch]]:
     """Sudden stops whose last step is too short for a vertex of its own: it would slow the one before.
 
     A car that runs at 20 m/s into the end of its road covers the last of it in a part of a step. It is there a step
@@ -117,7 +117,7 @@ def _stopping_in_time(path: Track, pieces: Sequence[PathPiece]) -> tuple[Track, 
     return path.having(**arrays), ends
 
 
-def _is_sudden(path: Track, piece: PathPiece) -> bool:
+def _is_sudden(path: Track, piece: RowStretch) -> bool:
     final, before = _way(path, piece.last), _way(path, piece.last - 1)
     stops = piece.stops or (piece.last == len(path.time) - 1 and final < 0.5 * before)
     return stops and final < LEAST_SPACING < before
@@ -162,7 +162,7 @@ def add_trajectories(act: etree._Element, name: str, item: Moving, draft: Draft)
             build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), draft.version)
 
 
-def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, draft: Draft) -> None:
+def _add_hop(event: etree._Element, name: str, item: Moving, piece: RowStretch, draft: Draft) -> None:
     """A piece too short for two vertices: the entity is put where it ends."""
     place = build.private_action(event, f"{name} place")
     build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.last))
