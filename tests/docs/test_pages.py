@@ -53,6 +53,7 @@ NOT_RUN = {
     ("docs/how_to/carla.md", "python scenario_runner.py"): SIMULATOR,
     ("docs/how_to/detect.md", "xosc-lateral detect recording.csv"): RECORDING,
     ("docs/how_to/detect.md", "xosc-lateral detect out/cut-in.xosc drives.csv"): "a detector of the reader's own",
+    ("docs/how_to/detect.md", "xosc-lateral vary cut-in.xosc --like motorway --replace"): RECORDING,
     ("docs/how_to/detect.md", '{"time"'): EXCERPT,
     (
         "docs/how_to/detect.md",

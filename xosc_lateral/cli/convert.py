@@ -101,13 +101,13 @@ def _reports(files: Sequence[str]) -> dict[str, str]:
     from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES
 
     kinds = {**dict.fromkeys(SUMMARY_SUFFIXES, "summary"), **dict.fromkeys(SUFFIXES, "trace")}
-    found = dict[str, str]()
+    by_kind = dict[str, str]()
     for text in files:
         kind = kinds.get(PurePath(text).suffix.lower(), "page")
-        if kind in found:
-            raise typer.BadParameter(f"{found[kind]} and {text}: one {kind} of an output", param_hint="--report")
-        found[kind] = text
-    return found
+        if kind in by_kind:
+            raise typer.BadParameter(f"{by_kind[kind]} and {text}: one {kind} of an output", param_hint="--report")
+        by_kind[kind] = text
+    return by_kind
 
 
 def _convert_one(

@@ -238,10 +238,10 @@ def _read(options: Mapping[str, Option], words: dict[str, Any]) -> Options:
             values[name] = Mapped(words.pop("columns"), words.pop("mapping_file")).mapping()
         elif not option.said_by and (stated := words.pop(name)) not in (None, []):
             with naming_option(flags_of(name, option)[0]):
-                given = {name: stated} if option.gives is None else option.gives(stated)
-                if foreign := sorted(given.keys() - options.keys()):
-                    raise ValueError(f"{given[foreign[0]]}: no {foreign[0]} can be said here")
-                values |= {key: options[key].read(value) for key, value in given.items()}
+                values_said = {name: stated} if option.gives is None else option.gives(stated)
+                if foreign := sorted(values_said.keys() - options.keys()):
+                    raise ValueError(f"{values_said[foreign[0]]}: no {foreign[0]} can be said here")
+                values |= {key: options[key].read(value) for key, value in values_said.items()}
     return values
 
 

@@ -141,19 +141,19 @@ class EsminiTraffic:
         simulation can go on.
         """
         names, every = self.player.objects()
-        self._ledger.keep(names)
+        self._ledger.expect(names)
         rows = self._sound(names, every)
         states = every[rows]
         moment, places = self._moment(rows, states, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
         known = self._ledger.known
         known["steered"][rows], known["rate"][rows] = moves.steered, moves.rate
-        own = np.flatnonzero(moves.steered)
-        t = places.centre[own] + places.left[own] * moves.offset[own]
-        begin = np.flatnonzero(np.isnan(known["place"][rows[own]])).tolist()
-        starts = {moment.names[own[k]]: t[k] - states["t"][own[k]] for k in begin}
-        self._tell(rows[own], states[own], t)
-        known["place"][rows[own]] = moves.offset[own]
+        steered = np.flatnonzero(moves.steered)
+        t = places.centre[steered] + places.left[steered] * moves.offset[steered]
+        begin = np.flatnonzero(np.isnan(known["place"][rows[steered]])).tolist()
+        starts = {moment.names[steered[k]]: t[k] - states["t"][steered[k]] for k in begin}
+        self._tell(rows[steered], states[steered], t)
+        known["place"][rows[steered]] = moves.offset[steered]
         for name in [name for name in self.undriven if name in moment.names]:
             if moves.steered[moment.names.index(name)]:
                 del self.undriven[name]
@@ -181,7 +181,7 @@ class EsminiTraffic:
         if not busy and not ledger.rests:
             return
         names, every = self.player.objects()
-        ledger.keep(names)
+        ledger.expect(names)
         for row, name in enumerate(names):
             if name not in busy and name not in ledger.rests:
                 continue

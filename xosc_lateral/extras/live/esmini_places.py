@@ -101,7 +101,7 @@ class Ledger:
         self.known = np.zeros(0, dtype=KNOWN)
         self.rests: dict[str, Rest] = {}
 
-    def keep(self, names: tuple[str, ...]) -> None:
+    def expect(self, names: tuple[str, ...]) -> None:
         """These vehicles are there: who is gone is forgotten, and begins anew where he is added again."""
         if names != self.names:
             before = {name: row for row, name in enumerate(self.names)}
@@ -154,9 +154,9 @@ class Ledger:
     def tell(self, rows: IntArray, states: NDArray[Any], t: FloatArray) -> None:
         """Note what the player is told: t of these vehicles. [m]"""
         self.known["told"][rows] = True
-        told = {"told_road": self.roads_of(states), "told_lane": states["lane"], "told_t": t,
+        values_told = {"told_road": self.roads_of(states), "told_lane": states["lane"], "told_t": t,
                 "told_offset": states["offset_t"] + t - states["t"]}  # fmt: skip
-        for name, values in told.items():
+        for name, values in values_told.items():
             self.known[name][rows] = values
 
     def dropped(self, row: int, states: NDArray[Any]) -> float | None:
@@ -257,10 +257,10 @@ class Ledger:
             where = (road[on], home[on], states["s"][on])
             width[on], is_driving[on] = self.network.lane_width(*where), self.network.lane_index(*where)[0] >= 0
             heading[on] = self._headings(*where)
-        found = {"lane_road": road, "lane": home, "is_lane": is_lane, "is_driving": is_driving & (width > 0.0),
+        looked_up = {"lane_road": road, "lane": home, "is_lane": is_lane, "is_driving": is_driving & (width > 0.0),
                  "left": self.left_of(states, on_lane), "width": np.maximum(width, 1e-3),
                  "heading": heading}  # fmt: skip
-        for name, values in found.items():
+        for name, values in looked_up.items():
             known[name][rows] = values
 
     def _foreign(

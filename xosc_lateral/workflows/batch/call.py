@@ -57,14 +57,14 @@ LIMITS = {"s": ("job_timeout", 1.0, 86_400.0), "MB": ("job_memory", 100.0, 1e6)}
 
 def _limits(stated: Sequence[str]) -> dict[str, Any]:
     """Limits of one scenario by their units."""
-    found = dict[str, Any]()
+    limits = dict[str, Any]()
     for text in stated:
         match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(s|MB)", text)
         name, least, most = LIMITS[match[2]] if match else ("", 0.0, 0.0)
         if match is None or not least <= float(match[1]) <= most:
             raise ValueError(f"{text!r}, expected 1s to 86400s or 100MB to 1000000MB")
-        found[name] = float(match[1])
-    return found
+        limits[name] = float(match[1])
+    return limits
 
 
 @spelled_out(ConvertSettings)

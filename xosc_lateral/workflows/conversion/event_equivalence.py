@@ -119,7 +119,7 @@ class EventEquivalence:
         return (
             then.keys() == now.keys()
             and all(abs(then[key].start - now[key].start) <= EVENT_TOLERANCE for key in then)
-            and not any(_far(*both) for both in others)
+            and not any(_is_elsewhere(*both) for both in others)
         )
 
     def compare(
@@ -185,7 +185,7 @@ class EventEquivalence:
         return chance
 
 
-def _far(entity: EntityMotion, twin: EntityMotion) -> bool:
+def _is_elsewhere(entity: EntityMotion, twin: EntityMotion) -> bool:
     """Whether an entity is ever elsewhere than in another run, as long as that lasts."""
     time = entity.time[entity.time <= twin.time[-1]]
     apart = [entity.columns[name][: len(time)] - np.interp(time, twin.time, twin.columns[name]) for name in "xy"]

@@ -361,7 +361,7 @@ def largest_of(comparisons: Sequence[Comparison]) -> tuple[EventShift, ...]:
     """Each event once for every way of driving, with its largest shift there: in order of these ways, and of time."""
     largest: dict[tuple[str, str, str | None], EventShift] = {}
     shifts = [shift for comparison in comparisons for shift in comparison.shifts]
-    for shift in sorted(shifts, key=lambda one: max(abs(one.start), abs(one.end)), reverse=True):
+    for shift in sorted(shifts, key=lambda shift: max(abs(shift.start), abs(shift.end)), reverse=True):
         largest.setdefault((shift.run, shift.event, shift.entity), shift)
     runs = list(dict.fromkeys(shift.run for shift in shifts))
     return tuple(sorted(largest.values(), key=lambda shift: (runs.index(shift.run), shift.time)))

@@ -110,7 +110,7 @@ def compare_parts(source: Track, other: Track) -> Iterator[Finding]:
 def worst_of(findings: Iterable[Finding]) -> list[Finding]:
     """Of each kind and entity."""
     worst: dict[tuple[str, str], Finding] = {}
-    for finding in sorted(findings, key=lambda one: one.size, reverse=True):
+    for finding in sorted(findings, key=lambda finding: finding.size, reverse=True):
         worst.setdefault((finding.entity, finding.kind), finding)
     return list(worst.values())
 

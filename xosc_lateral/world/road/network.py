@@ -175,13 +175,13 @@ class RoadNetwork(SurfaceIndex, Routes):
 
     def _nearest_lane(self, x: float, y: float, z: float | None, lane_types: Collection[str] | None) -> LaneCoordinates:
         key = x, y, z, lane_types if lane_types is None else frozenset(lane_types)
-        if (found := self._found.get(key)) is None:
+        if (place := self._found.get(key)) is None:
             best = self.world_to_lane(x, y, z, lane_types=lane_types)
-            found = LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
+            place = LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
             if len(self._found) >= MOST_FOUND:
                 self._found.clear()
-            self._found[key] = found
-        return found
+            self._found[key] = place
+        return place
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:
