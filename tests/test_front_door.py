@@ -178,7 +178,7 @@ def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_i
     time = 0.2 * np.arange(100.0)
     drives = [
         pd.DataFrame(
-            {"drive": k, "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5, "left_distance": d}
+            {"drive": k, "time": time, "offset": 0.1 * np.sin(time + k), "lane_width": 3.5, "left_distance": d}
         ).assign(speed=30.0)
         for k, d in enumerate((np.nan, np.inf, 12.0))
     ]

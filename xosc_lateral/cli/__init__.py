@@ -19,7 +19,6 @@ from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.plugins import offered
 from xosc_lateral.base.signals import Interrupted, raising_signals
 from xosc_lateral.base.version import __version__
-from xosc_lateral.cli.cures import cures
 from xosc_lateral.files.source import guarding_inputs
 
 VERBS = {
@@ -144,6 +143,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
+            from xosc_lateral.cli.cures import cures
+
             line = "; ".join([_in_words(error), *cures(words)])
             line = in_terminal(f"xosc-lateral: {' '.join(line.split())}")
             if "--json" in words and {"-v", "--verbose"} & {*words}:
@@ -164,6 +165,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         usage = cast(Any, error)
         usage.show()
+        from xosc_lateral.cli.cures import cures
+
         for cure in cures(words, usage):
             print(in_terminal(f"xosc-lateral: {cure}"), file=sys.stderr)
         code = usage.exit_code

@@ -161,8 +161,9 @@ def _convert_one(
                 if its_summary is not None:
                     result.write_summary(its_summary, force=True)
             reply.say(result)
-            if reply.as_json and result.cut_off is not None:
-                reply.warn([result.cut_off])
+            if reply.quiet or reply.as_json:
+                strict = options["strict"]
+                reply.warn(result.warnings if strict else filter(None, [result.cut_off]), strict=strict)
             unclean |= bool(result.warnings) or not result.enriched
     if options["strict"] and unclean:
         raise typer.Exit(1)
@@ -190,8 +191,9 @@ def _convert_batch(inputs: Sequence[str], output: str | None, options: Mapping[s
         say(f"xosc-lateral: interrupted; {what}", err=True)
         raise typer.Exit(128 + signal.number) from None
     reply.say_words(str(result), {"kind": "summary", **result.totals()}, err=False)
-    if result.cut_off and reply.as_json:
-        reply.warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
+    if result.cut_off and (reply.quiet or reply.as_json):
+        line = f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"
+        reply.warn([line], strict=options["strict"])
     if result.failed or (options["strict"] and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)
 

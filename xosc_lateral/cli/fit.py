@@ -70,7 +70,7 @@ def fit(
     facts = None if written is None else {"output": str(written), **profile_record(profile)}
     reply.say_words(describe_profile(profile), facts)
     warned = [*(str(one.message) for one in caught), *fit_warnings(profile, options.get("sensor_noise"))]
-    reply.warn(warned)
+    reply.warn(warned, strict=strict)
     refuse_warnings(warned, strict)
 
 
@@ -98,7 +98,7 @@ def sample(
     else:
         written = made.write(output, force=reply.force)
         reply.say_words(f"{made.headline()} in {written}", {"output": str(written), **made.to_dict()})
-    reply.warn(made.warnings)
+    reply.warn(made.warnings, strict=strict)
     refuse_warnings(made.warnings, strict)
 
 

@@ -79,7 +79,7 @@ def states(
     elif not reply.quiet:
         for note in played.notes:
             say(note, err=True)
-    reply.warn(played.warnings)
+    reply.warn(played.warnings, strict=options["strict"])
     refuse_warnings(played.warnings, options["strict"])
 
 
@@ -91,8 +91,8 @@ def segments(
     played = _played(scenario, options)
     listed = xl.segments(played)
     reply.say(listed)
-    if reply.as_json:
-        reply.warn(listed.warnings)
+    if reply.as_json or reply.quiet:
+        reply.warn(listed.warnings, strict=options["strict"])
     refuse_warnings(listed.warnings, options["strict"])
 
 
@@ -130,7 +130,7 @@ def view(
                 written += [] if image is None else [played.write_image(image, at, force=force)]
             with naming_option("--animation"):
                 written += [] if animation is None else [played.write_animation(animation, force=force)]
-        Printing(quiet).warn(played.warnings)
+        Printing(quiet).warn(played.warnings, strict=options.get("strict", False))
         for path in written if not quiet else ():
             if path is not None:
                 say(path)

@@ -155,9 +155,9 @@ class Printing:
         elif even or not self.quiet:
             say(result, err=err)
 
-    def warn(self, lines: Iterable[str]) -> None:
-        """Say on standard error what the result's own words, which are not printed, would say."""
-        for line in () if self.quiet else lines:
+    def warn(self, lines: Iterable[str], *, strict: bool = False) -> None:
+        """Say warnings on standard error; `strict`: they are errors, and are said to whom wants it quiet as well."""
+        for line in lines if strict or not self.quiet else ():
             say(f"xosc-lateral: warning: {line}", err=True)
 
     def say_words(self, words: str, values: Any, *, err: bool = True) -> None:

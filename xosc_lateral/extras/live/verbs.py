@@ -62,7 +62,7 @@ class Outputs:
                 run.write(table, force=reply.force)
             if trace is not None:
                 run.write_osi(trace, force=reply.force)
-        reply.warn(run.warnings)
+        reply.warn(run.warnings, strict=self.strict)
         reply.say(run)
         refuse_warnings(run.warnings, self.strict)
 
