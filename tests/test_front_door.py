@@ -187,7 +187,8 @@ def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_i
     assert made.warnings == ("3 of 3 drives: wind_speed not known, left without effect",)
     shift = (made.to_frame()["offset"] - alike.to_frame()["offset"]).groupby(table["drive"].to_numpy()).mean()
     np.testing.assert_allclose(shift, -0.3 * (np.array([0.0, 0.0, np.exp(-12.0 / 20.0)]) - 0.2), atol=1e-9)
-    both = xl.sample(bare.with_effects(*effects), context=[drives[2].drop(columns="left_distance"), table], seed=1)
+    other = drives[2].drop(columns="left_distance").assign(offset=0.0)
+    both = xl.sample(bare.with_effects(*effects), context=[other, table], seed=1)
     assert both.warnings == (
         "drive DataFrame 1:2: left_distance not known, left without effect",
         "4 of 4 drives: wind_speed not known, left without effect",
