@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 from pathlib import Path
 
@@ -253,6 +254,7 @@ def test_a_profiles_id_stays_inside_its_library(
 def test_a_log_names_files_and_ends_with_its_command(tmp_path, capsys):
     target = tmp_path / "cut-in"
     assert main(["template", "write", "cut-in", "-o", str(target), "--verbose"]) == 0
+    assert logging.getLogger("xosc_lateral").level == logging.NOTSET, "for one command alone"
     err = capsys.readouterr().err
     assert re.search(rf"^\d\d:\d\d:\d\d\.\d+ wrote {re.escape(str(target / 'cut-in.xosc'))}$", err, flags=re.MULTILINE)
     assert main(["segments", str(target / "cut-in.xosc"), "-v", "--quiet"]) == 0

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from inspect import Parameter, Signature, signature
 from logging import Formatter, LogRecord
 from pathlib import Path
@@ -56,8 +56,9 @@ def _begin_log(context: typer.Context, wanted: bool) -> bool:
         log, handler = logging.getLogger("xosc_lateral"), logging.StreamHandler()
         handler.setFormatter(_LogFormat(context))
         log.addHandler(handler)
+        context.call_on_close(partial(log.setLevel, log.level))
+        context.call_on_close(partial(log.removeHandler, handler))
         log.setLevel(logging.INFO)
-        context.call_on_close(lambda: log.removeHandler(handler))
     return wanted
 
 
