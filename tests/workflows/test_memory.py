@@ -123,7 +123,7 @@ def test_a_wrong_type_is_named_in_a_line(verb, wrong):
 
 def test_what_is_not_given_is_not_looked_for_on_a_disk(template, monkeypatch):
     monkeypatch.chdir(template[1].parent)
-    with pytest.raises(xl.FormatError, match=r"road file '.*' does not exist"):
+    with pytest.raises(xl.FormatError, match=r"road file '.*': no such file or folder"):
         xl.convert(template[0].read_bytes())
     outside = template[0].read_text(encoding="utf-8").replace(f'"{template[1].name}"', f'"{template[1].as_posix()}"')
     with pytest.raises(xl.FormatError, match="outside the scenario's folders"):

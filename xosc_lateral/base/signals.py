@@ -73,7 +73,10 @@ class TimeOver(BaseException):
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise `TimeOver` in the block after so long; without effect in a thread, and where systems have no such alarm."""
+    """Raise `TimeOver` in the block after so long; without effect in a thread, and where systems have no such alarm.
+
+    And again each second: what is raised while garbage is collected, Python only prints.
+    """
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -82,7 +85,7 @@ def time_limit(seconds: float) -> Iterator[None]:
         raise TimeOver
 
     before = signal.signal(signal.SIGALRM, over)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
     try:
         yield
     finally:

@@ -23,9 +23,12 @@ def test_python_the_command_line_and_the_configuration_have_the_same_options() -
     assert all(f"\n{name} : " in str(ConvertSettings.__doc__) for name in OPTIONS)
     for call in (xl.convert, xl.convert_many):
         assert OPTIONS.keys() <= inspect.signature(call).parameters.keys()
-    assert OPTIONS.keys() <= {option.name for option in verb("convert").params}
+    on_the_line = {option.name: option.opts for option in verb("convert").params}
+    others = {name: option.said_by for name, option in OPTIONS.items() if option.said_by}
+    assert OPTIONS.keys() - others.keys() <= on_the_line.keys()
+    assert {*others.values()} <= {flag for flags in on_the_line.values() for flag in flags}
     shared = {name for name, option in OPTIONS.items() if name in SHARED and option.words is SHARED[name].words}
-    assert shared == SHARED.keys() - {"profile", "columns", "jobs"}
+    assert shared == SHARED.keys() - {"profile", "columns", "jobs", "with_sensor"}
     assert OPTIONS.keys() >= SETTINGS
 
 

@@ -78,7 +78,7 @@ def test_the_bell_has_the_files_times_and_hardly_more_speed_and_ends_in_the_same
 
 @pytest.mark.parametrize(
     ("shape", "duration", "why"),
-    [("sinusoidal", "1.8", "it takes 1.8 s"), ("step", "0", "it takes 0.0 s")],
+    [("sinusoidal", "1.8", "it takes 1.80 s"), ("step", "0", "it takes 0.00 s")],
 )
 def test_what_the_bell_is_not_for_stays_as_written_and_is_named(
     tmp_path: Path, shape: str, duration: str, why: str

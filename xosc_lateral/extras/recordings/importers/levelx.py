@@ -150,7 +150,11 @@ class Recording:
 
     def markings(self, side: str) -> FloatArray:
         """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
-        return np.array([float(part) for part in self._stated(f"{side}LaneMarkings").split(";")])
+        text = self._stated(f"{side}LaneMarkings")
+        places = pd.to_numeric(pd.Series(text.split(";")), errors="coerce").to_numpy(dtype=np.float64)
+        if not np.isfinite(places).all():
+            raise FormatError(f"{side}LaneMarkings are {text!r}, which are no places", path=self.path)
+        return places
 
     def _stated(self, column: str) -> str:
         if column not in self.about.columns or self.about.empty:
