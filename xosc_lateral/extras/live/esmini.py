@@ -54,6 +54,9 @@ _ACTION_TYPE, _RUNNING_STATE = 7, 2
 _VEHICLE_TYPE, _TRUCK_CATEGORIES, _PULLED_CATEGORIES = 1, (2, 3, 4, 5), (3, 4)
 """`Object::Type`; `Vehicle::Category` of trucks, trailers and buses, and of what has no driver of its own."""
 
+_PLACE = ("x", "y", "h", "t", "s", "speed", "offset_t")
+"""What a vehicle's state has to say."""
+
 EXTERNAL_CONTROLLERS = (1, 11)
 """Controllers that wait for somebody else: external, UDP driver (`Controller::Type`)."""
 
@@ -268,14 +271,11 @@ class EsminiTraffic:
         is_vehicle = states["type"] == _VEHICLE_TYPE
         for k in np.flatnonzero(~is_vehicle).tolist():
             self.undriven.setdefault(names[k], "no vehicle")
-        is_sound = is_vehicle.copy()
-        for what in ("x", "y", "h", "t", "s", "speed", "offset_t"):
-            finite = np.isfinite(states[what])
-            for k in np.flatnonzero(is_sound & ~finite).tolist():
-                line = f"vehicle {names[k]!r}: {what} is {states[what][k]}; it is left alone"
-                self._say((names[k], what), line)
-            is_sound &= finite
-        return np.flatnonzero(is_sound)
+        finite = np.isfinite([states[what] for what in _PLACE])
+        for k in np.flatnonzero(is_vehicle & ~finite.all(axis=0)).tolist():
+            what = _PLACE[int(np.argmin(finite[:, k]))]
+            self._say((names[k], what), f"vehicle {names[k]!r}: {what} is {states[what][k]}; it is left alone")
+        return np.flatnonzero(is_vehicle & finite.all(axis=0))
 
     def _why_not_ours(self, name: str, controller: int, category: int) -> str:
         """Why no driver of ours has a vehicle; empty: he may."""
