@@ -91,7 +91,7 @@ MISTAKES = {
     "convert cut-in.xosc -o a.xosc --jobs 0": "-1 for one per core",
     "convert cut-in.xosc -o a.xosc --player gazebo": "esmini, carla",
     "convert cut-in.xosc -o a.xosc --version 2.0": "1.0, 1.1, 1.2, 1.3, 1.4 can",
-    "convert cut-in.xosc -o a.xosc --entity Truck:motorway": "--entity is gone: -p NAME=PROFILE",
+    "convert cut-in.xosc -o a.xosc --entity Truck:motorway": "Truck:motorway",
     "convert cut-in.xosc -o a.xosc --enrich cutin": "did you mean 'CutIn'?",
     "convert cut-in.xosc -o a.xosc --ego Egoo": "did you mean 'Ego'?",
     "convert cut-in.xosc -o a.xosc --set speed=28": "declared: deceleration, ego_speed",

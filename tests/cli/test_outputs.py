@@ -11,7 +11,7 @@ import pytest
 
 from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
-from xosc_lateral.cli.cures import GONE
+from xosc_lateral.cli.cures import GONE, todays
 
 
 @pytest.fixture
@@ -297,5 +297,24 @@ def test_what_went_says_what_takes_its_place(capsys: pytest.CaptureFixture[str])
     for option, today in GONE.items():
         assert main(["convert", "cut-in.xosc", option, "x"]) == 2
         assert f"{option} is gone: {today}" in capsys.readouterr().err
-    assert main(["play", "cut-in.xosc"]) == 2
-    assert "'states' does that" in capsys.readouterr().err
+
+
+def test_former_words_are_known(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    former = "--for esmini --only=Ego --resample 2 --entity Ego=rural --jam-corridor --summary s.md --job-timeout 60"
+    today = "--player esmini --enrich=Ego --attempts 2 -p Ego=rural --with jam-corridor --report s.md --job-limit 60s"
+    written = []
+    for verb, words in (("play", former), ("states", today)):
+        assert main([verb, "cut-in.xosc", "-o", "s.csv", "--time-limit", "1", "-q"]) == 0
+        told = ["--ego", "none", "--time-limit", "1", "-q"]
+        assert main(["convert", "cut-in.xosc", "-o", "c.xosc", "--force", *words.split(), *told]) == 0
+        written.append([Path(name).read_bytes() for name in ("s.csv", "c.xosc", "s.md")])
+        said = [line for line in capsys.readouterr().err.splitlines() if "now" in line]
+        assert len(said) == (8 if verb == "play" else 0)
+    assert written[0] == written[1]
+    assert todays(["a", "--cluster", "tcp://x:1", "--log-json", "--", "--osi"], ["--jobs", "--json"]) == [
+        "a", "--jobs", "tcp://x:1", "--json", "--verbose", "--", "--osi",
+    ]  # fmt: skip
+    assert todays(["a", "--osi", "t.mcap"], ["--osi", "--report"]) == ["a", "--osi", "t.mcap"]

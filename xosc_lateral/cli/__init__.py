@@ -103,8 +103,13 @@ class _Verbs(TyperGroup):
         self.commands = {name: TyperCommand(name, short_help=does) for name, does in VERBS.items()}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        name, known, rest = super().resolve_command(ctx, args)
-        return name, known and verb(str(name)), rest
+        from xosc_lateral.cli.cures import todays, todays_verb
+
+        name, known, rest = super().resolve_command(ctx, [todays_verb(args[0]), *args[1:]])
+        if known is None:
+            return name, known, rest
+        command = verb(str(name))
+        return name, command, todays(rest, {flag for param in command.params for flag in param.opts})
 
 
 app = typer.Typer(

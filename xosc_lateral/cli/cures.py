@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +13,7 @@ SIBLINGS = {
     "-h": ("help", "usage"), "--version": ("version",),
     "convert": ("enrich", "batch", "replay", "run", "generate", "randomize"),
     "fit": ("train", "learn", "fit-profile"), "evaluate": ("score", "compare", "validate"), "check": ("health", "lint"),
-    "states": ("play",), "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"),
+    "sample": ("simulate", "offsets"), "view": ("show", "open", "plot"),
     "verify": ("diff", "status"),
     "profiles list": ("list", "library", "list-profiles"), "template write": ("new", "write-template"),
     "template list": ("templates", "list-templates"), "convert SCENARIO... or FOLDER": ("convert-many",),
@@ -20,16 +21,52 @@ SIBLINGS = {
 }  # fmt: skip
 """Verb -> what others call it, Python's calls among them."""
 
+FORMER_VERBS = {"play": "states"}
+"""What a verb was called in 0.2 -> its name."""
+
+FORMER = {
+    "--osi": ("--report", "{}"), "--summary": ("--report", "{}"), "--entity": ("--profile", "{}"),
+    "--jam-corridor": ("--with", "jam-corridor"), "--road-path": ("--road", "{}"), "--cluster": ("--jobs", "{}"),
+    "--player-library": ("--player", "{}"), "--job-timeout": ("--job-limit", "{}s"),
+    "--job-memory": ("--job-limit", "{}MB"), "--log-json": ("--json", "--verbose"), "--train": ("--home", "{}"),
+    "--for": ("--player", "{}"), "--resample": ("--attempts", "{}"), "--only": ("--enrich", "{}"),
+}  # fmt: skip
+"""What was an option of a verb that has it no more -> what is said today, and its value."""
+
 GONE = {
-    "--osi": "--report FILE.mcap", "--summary": "--report FILE.md", "--jam-corridor": "--with jam-corridor",
-    "--entity": "-p NAME=PROFILE", "--road-path": "--road FOLDER", "--cluster": "--jobs ADDRESS",
-    "--player-library": "--player LIBRARY", "--job-timeout": "--job-limit 600s", "--job-memory": "--job-limit 4000MB",
-    "--log-json": "--json --verbose", "--for": "--player", "--resample": "--attempts", "--only": "--enrich",
-    "--train": "--home", "--propose": "check TABLE... --write-mapping MAPPING.toml",
+    "--propose": "check TABLE... --write-mapping MAPPING.toml",
     "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
     "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
-}  # fmt: skip
-"""What was an option of a verb -> what takes its place."""
+}
+"""What was an option of a verb and has no name of today -> what takes its place."""
+
+
+def todays_verb(word: str) -> str:
+    """A verb by its name of today; a former one is named on standard error."""
+    if word in FORMER_VERBS:
+        print(f"xosc-lateral: warning: {word} is called {FORMER_VERBS[word]} now", file=sys.stderr)
+    return FORMER_VERBS.get(word, word)
+
+
+def todays(words: Sequence[str], options: Collection[str]) -> list[str]:
+    """A verb's words by today's names, of a verb with these options; former ones are named on standard error."""
+    made, rest = list[str](), list(words)
+    while rest:
+        word = rest.pop(0)
+        if word == "--":
+            return [*made, word, *rest]
+        option, equals, value = word.partition("=")
+        name, form = FORMER.get(option, ("", ""))
+        if option in options or name not in options:
+            made.append(word)
+            continue
+        if "{}" in form and not equals:
+            value = rest.pop(0) if rest else ""
+        made += [name, form.format(value)]
+        said = f"xosc-lateral: warning: {option} is {name} {form.format('...')} now, and will be unknown next"
+        print(said, file=sys.stderr)
+    return made
+
 
 PYTHON = ("None", "True", "False")
 
