@@ -63,8 +63,8 @@ def todays(words: Sequence[str], options: Collection[str]) -> list[str]:
         if "{}" in form and not equals:
             value = rest.pop(0) if rest else ""
         made += [name, form.format(value)]
-        said = f"xosc-lateral: warning: {option} is {name} {form.format('...')} now, and will be unknown next"
-        print(said, file=sys.stderr)
+        line = f"xosc-lateral: warning: {option} is {name} {form.format('...')} now, and will be unknown next"
+        print(line, file=sys.stderr)
     return made
 
 
