@@ -75,7 +75,8 @@ class TimeOver(BaseException):
 def time_limit(seconds: float) -> Iterator[None]:
     """Raise `TimeOver` in the block after so long; without effect in a thread, and where systems have no such alarm.
 
-    And again each second: what is raised while garbage is collected, Python only prints.
+    And again ten seconds later: what is raised while garbage is collected, Python only prints. Not sooner, so that what
+    ends in good order has the time for it.
     """
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
@@ -85,7 +86,7 @@ def time_limit(seconds: float) -> Iterator[None]:
         raise TimeOver
 
     before = signal.signal(signal.SIGALRM, over)
-    signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
+    signal.setitimer(signal.ITIMER_REAL, seconds, 10.0)
     try:
         yield
     finally:
