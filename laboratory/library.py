@@ -43,7 +43,7 @@ from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_moveme
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
-from xosc_lateral.extras.detect.band import RECORDED
+from xosc_lateral.extras.detect.band import RECORDED_SPECTRUM
 from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.extras.recordings.importers.openacc import import_openacc
 from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
@@ -109,7 +109,7 @@ def build_library(source: Path, gnss: Sequence[Path], *, model: str = "best") ->
     inputs = {path.name: parsed_hash(path) for path in (source, *gnss)}
     known = Provenance(source=f"{SOURCE}; {RURAL_SOURCE}", licence=MOTORWAY_LICENCE, inputs=inputs)
     population = replace(_population_profile(seen, known, model), maneuvers=read_maneuvers(source), beside=ANSWERS)
-    fit = {**population.provenance.fit, RECORDED: recorded_spectrum(runs)}
+    fit = {**population.provenance.fit, RECORDED_SPECTRUM: recorded_spectrum(runs)}
     population = replace(population, provenance=replace(population.provenance, fit=fit))
     profiles = [population, _single_profile(seen, kind, known, model), rural]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]

@@ -11,7 +11,7 @@ import pytest
 
 from xosc_lateral.base.plugins import shipped_folder
 from xosc_lateral.cli import main
-from xosc_lateral.cli.cures import GONE, todays
+from xosc_lateral.cli.cures import GONE_OPTIONS, todays
 
 
 @pytest.fixture
@@ -294,7 +294,7 @@ def test_a_damaged_table_is_refused_in_words_of_our_own(tmp_path, capsys, name, 
 
 
 def test_what_went_says_what_takes_its_place(capsys: pytest.CaptureFixture[str]) -> None:
-    for option, today in GONE.items():
+    for option, today in GONE_OPTIONS.items():
         assert main(["convert", "cut-in.xosc", option, "x"]) == 2
         assert f"{option} is gone: {today}" in capsys.readouterr().err
 

@@ -24,7 +24,7 @@ SIBLINGS = {
 FORMER_VERBS = {"play": "states"}
 """What a verb was called in 0.2 -> its name."""
 
-FORMER = {
+FORMER_OPTIONS = {
     "--osi": ("--report", "{}"), "--summary": ("--report", "{}"), "--entity": ("--profile", "{}"),
     "--jam-corridor": ("--with", "jam-corridor"), "--road-path": ("--road", "{}"), "--cluster": ("--jobs", "{}"),
     "--player-library": ("--player", "{}"), "--job-timeout": ("--job-limit", "{}s"),
@@ -33,7 +33,7 @@ FORMER = {
 }  # fmt: skip
 """What was an option of a verb that has it no more -> what is said today, and its value."""
 
-GONE = {
+GONE_OPTIONS = {
     "--propose": "check TABLE... --write-mapping MAPPING.toml",
     "--threshold": "a program's score above 0.5 is an alarm; --tune finds the threshold of any score",
     "--answer-time": "a program has 10 s for each answer, and 60 s for the first",
@@ -56,7 +56,7 @@ def todays(words: Sequence[str], options: Collection[str]) -> list[str]:
         if word == "--":
             return [*made, word, *rest]
         option, equals, value = word.partition("=")
-        name, form = FORMER.get(option, ("", ""))
+        name, form = FORMER_OPTIONS.get(option, ("", ""))
         if option in options or name not in options:
             made.append(word)
             continue
@@ -68,7 +68,7 @@ def todays(words: Sequence[str], options: Collection[str]) -> list[str]:
     return made
 
 
-PYTHON = ("None", "True", "False")
+PYTHON_WORDS = ("None", "True", "False")
 
 
 def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
@@ -77,7 +77,7 @@ def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not before.startswith("-"):
             yield f"{word!r} stands alone: options are written --{name.replace('_', '-')} {value}, before each value"
-        if word in PYTHON or value in PYTHON:
+        if word in PYTHON_WORDS or value in PYTHON_WORDS:
             yield f"{value or word} is a word of Python: leave an option out that is not wanted, a switch has no value"
     if usage is None:
         return
@@ -92,7 +92,7 @@ def cures(words: Sequence[str], usage: Any = None) -> Iterator[str]:
         same = [verb for verb, others in SIBLINGS.items() if context.parent is None and name in others]
         yield f"{same[0]!r} does that" if same else f"{context.command_path} has {', '.join(verbs)}{meant_for(name)}"
     wrong = str(usage.format_message())
-    yield from (f"{old} is gone: {today}" for old, today in GONE.items() if f"No such option: {old}" in wrong)
+    yield from (f"{old} is gone: {today}" for old, today in GONE_OPTIONS.items() if f"No such option: {old}" in wrong)
     if help_text := getattr(getattr(usage, "param", None), "help", None):
         yield f"{' '.join(usage.param.opts)}: {help_text}"
     if context is not None and not verbs:

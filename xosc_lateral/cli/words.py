@@ -207,7 +207,7 @@ class Writing(Printing):
 
 def flags_of(name: str, option: Option) -> tuple[str, ...]:
     """How a setting is called on the command line."""
-    return option.flags or (option.said_by and (option.said_by,)) or (f"--{name.replace('_', '-')}",)
+    return option.flags or (f"--{name.replace('_', '-')}",)
 
 
 def _fields(group: type) -> list[Parameter]:

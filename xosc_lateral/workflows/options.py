@@ -332,17 +332,13 @@ def roads(stated: Sequence[Path]) -> dict[str, Any]:
     return {**({"road": files[0]} if files else {}), **({"road_path": folders} if folders else {})}
 
 
-def profiles_named(common: str, by_name: str) -> Callable[[Sequence[str]], dict[str, Any]]:
-    """What ``PROFILE`` and ``NAME=PROFILE`` give to the keywords for everybody and for some."""
-
-    def gives(stated: Sequence[str]) -> dict[str, Any]:
-        named = [word for word in stated if "=" in word and not Path(word).exists()]
-        plain = [word for word in stated if word not in named]
-        if len(plain) > 1:
-            raise ValueError(f"{plain[0]} and {plain[1]}: one profile for everybody, others as NAME=PROFILE")
-        return {**({common: plain[0]} if plain else {}), **({by_name: named} if named else {})}
-
-    return gives
+def profile_and_entities(stated: Sequence[str]) -> dict[str, Any]:
+    """A profile for everybody, and those of single entities: ``PROFILE`` and ``NAME=PROFILE``."""
+    named = [word for word in stated if "=" in word and not Path(word).exists()]
+    plain = [word for word in stated if word not in named]
+    if len(plain) > 1:
+        raise ValueError(f"{plain[0]} and {plain[1]}: one profile for everybody, others as NAME=PROFILE")
+    return {**({"profile": plain[0]} if plain else {}), **({"entity": named} if named else {})}
 
 
 class Part(StrEnum):

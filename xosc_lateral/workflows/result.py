@@ -92,7 +92,7 @@ class Result(Telling, ABC):
         return {"inputs": parsed_hashes(getattr(self, "files", ()))}
 
 
-UNITS: Mapping[str, str] = {
+COLUMN_UNITS: Mapping[str, str] = {
     **CONTEXT_UNITS,
     **dict.fromkeys(("time", "start", "end"), "s"),
     **dict.fromkeys(("h", "heading"), "rad"),
@@ -100,7 +100,7 @@ UNITS: Mapping[str, str] = {
     **dict.fromkeys(("s", "x", "y", "z", "x_nominal", "y_nominal"), "m"),
 }
 """Column of a result -> its unit, where its name does not say it."""
-SUFFIXES = {"m": "m", "s": "s", "h": "h", "hz": "Hz"}
+UNIT_SUFFIXES = {"m": "m", "s": "s", "h": "h", "hz": "Hz"}
 
 
 def with_units(to_frame: Callable[..., pd.DataFrame]) -> Callable[..., pd.DataFrame]:
@@ -112,7 +112,9 @@ def with_units(to_frame: Callable[..., pd.DataFrame]) -> Callable[..., pd.DataFr
         named = {name: re.fullmatch(r"(.+) \[(.+)\]", str(name)) for name in frame.columns}
         stated = {re.sub(r"\W+", "_", found[1]): found[2] for found in named.values() if found}
         frame = frame.rename(columns={name: re.sub(r"\W+", "_", found[1]) for name, found in named.items() if found})
-        known = {name: UNITS.get(name) or SUFFIXES.get(str(name).rpartition("_")[2]) for name in frame.columns}
+        known = {
+            name: COLUMN_UNITS.get(name) or UNIT_SUFFIXES.get(str(name).rpartition("_")[2]) for name in frame.columns
+        }
         frame.attrs["units"] = {name: unit for name, unit in (known | stated).items() if unit and unit != "-"}
         return frame
 

@@ -10,7 +10,7 @@ import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, track
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.band import RECORDED, SensorBand, band_of, keeping_spectrum, spectrum_in
+from xosc_lateral.extras.detect.band import RECORDED_SPECTRUM, SensorBand, band_of, keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.tracks import STEP
 from xosc_lateral.files.profiles import read_profile
 
@@ -71,7 +71,7 @@ def test_a_shipped_profile_holds_the_spectrum_of_its_recording_and_nothing_else_
     for hertz, density in (([0.2, 0.1], [1, 1]), ([0.2], [-1]), ([], []), ([0.1, 0.2, 0.3], [1, 1]), (7, "x")):
         known = {"frequency_hz": hertz, "m2_per_hz": density}
         with pytest.raises(DriverProfileError, match="does not hold"):
-            spectrum_in(replace(shipped, provenance=replace(shipped.provenance, fit={RECORDED: known})))
+            spectrum_in(replace(shipped, provenance=replace(shipped.provenance, fit={RECORDED_SPECTRUM: known})))
 
 
 def test_through_a_smoother_recording_s_band_thresholds_become_more_sensitive(tmp_path, monkeypatch):

@@ -76,13 +76,13 @@ def band_of(recorded: Spectrum, home: Spectrum) -> SensorBand:
     return SensorBand(frequency, np.minimum(np.nan_to_num(gain, nan=1.0), 1.0))
 
 
-RECORDED = "recorded_spectrum"
+RECORDED_SPECTRUM = "recorded_spectrum"
 """Key of a profile's record: the spectrum of its recording."""
 
 
 def spectrum_in(profile: DriverProfile) -> Spectrum:
     """Of lane keeping in a profile's recording, from its record; `DriverProfileError`: that holds none."""
-    known: Any = profile.provenance.fit.get(RECORDED)
+    known: Any = profile.provenance.fit.get(RECORDED_SPECTRUM)
     try:
         frequency, density = (np.array(known[name], dtype=np.float64) for name in ("frequency_hz", "m2_per_hz"))
         if frequency[0] > 0.0 and (np.diff(frequency) > 0.0).all() and (density[: len(frequency)] >= 0.0).all():

@@ -20,7 +20,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
 from xosc_lateral.base.own_clock import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.esmini_library import STATE, EsminiLibrary, ObjectState, StoryboardCallback
+from xosc_lateral.extras.live.esmini_library import OBJECT_STATE, EsminiLibrary, ObjectState, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest
 from xosc_lateral.extras.live.loop import Row
 from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
@@ -157,9 +157,8 @@ class EsminiTraffic:
         starts = {moment.names[steered[k]]: t[k] - states["t"][steered[k]] for k in begin}
         self._tell(rows[steered], states[steered], t)
         known["place"][rows[steered]] = moves.offset[steered]
-        for name in [name for name in self.undriven if name in moment.names]:
-            if moves.steered[moment.names.index(name)]:
-                del self.undriven[name]
+        for k in steered.tolist() if self.undriven else ():
+            self.undriven.pop(moment.names[k], None)
         for k, name in enumerate(moment.names if starts else ()):  # what it pulls begins behind a vehicle
             first = self._unit.get(name, name)
             if first != name and first in starts:
@@ -242,7 +241,7 @@ class EsminiTraffic:
 
     def offset_of(self, state: ObjectState) -> float:
         """From the centre of the lane that it is on, positive LEFT of travel. [m]"""
-        return float(state.offset_t * self._ledger.left_of(np.frombuffer(bytes(state), dtype=STATE))[0])
+        return float(state.offset_t * self._ledger.left_of(np.frombuffer(bytes(state), dtype=OBJECT_STATE))[0])
 
     # ---- what is told ------------------------------------------------------------------------------------------------
     def _tell(self, rows: IntArray, states: NDArray[Any], t: FloatArray) -> None:

@@ -27,7 +27,7 @@ class ObjectState(c.Structure):
     )
 
 
-STATE = np.dtype(ObjectState)
+OBJECT_STATE = np.dtype(ObjectState)
 """The same as a row of an array."""
 
 StoryboardCallback = c.CFUNCTYPE(None, c.c_char_p, c.c_int, c.c_int, c.c_char_p)
@@ -77,7 +77,7 @@ class EsminiLibrary:
         self._is_known = False
         self._ids: list[int] = []
         self._names: list[str] = []
-        self._states = np.zeros(0, dtype=STATE)
+        self._states = np.zeros(0, dtype=OBJECT_STATE)
         self.heard: list[tuple[bytes, int, int, bytes]] = []
         """Changes of storyboard elements while `open_player` opened a scenario."""
 
@@ -98,16 +98,16 @@ class EsminiLibrary:
         return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
 
     def objects(self) -> tuple[tuple[str, ...], NDArray[Any]]:
-        """Names and states (`STATE`) of all objects that have one, shape (n,). Raises as `state`."""
+        """Names and states (`OBJECT_STATE`) of all objects that have one, shape (n,). Raises as `state`."""
         ids = [self.SE_GetId(index) for index in range(self.SE_GetNumberOfObjects())]
         if ids != self._ids:  # names are asked for once
-            self._ids, self._states = ids, np.zeros(len(ids), dtype=STATE)
+            self._ids, self._states = ids, np.zeros(len(ids), dtype=OBJECT_STATE)
             self._names = [(self.SE_GetObjectName(number) or b"").decode() for number in ids]
         for number in ids:
             if self._is_known:
                 break
             self._compare(number)
-        begin, size, read = self._states.ctypes.data, STATE.itemsize, self.SE_GetObjectState
+        begin, size, read = self._states.ctypes.data, OBJECT_STATE.itemsize, self.SE_GetObjectState
         there = [row for row, number in enumerate(ids) if read(number, begin + row * size) == 0]
         return tuple([self._names[row] for row in there]), self._states[there]
 

@@ -44,10 +44,10 @@ class Rest:
     way: float = 0.0  # Beside the maneuver so far. [m]
 
 
-NOWHERE = -2
+NO_ROAD_YET = -2
 """In place of a road: nothing is known yet."""
 
-KNOWN = np.dtype(
+KNOWN_VEHICLE = np.dtype(
     [("base", float), ("place", float), ("steered", bool), ("rate", float),
      ("home_road", np.int64), ("home_from", float), ("home_to", float), ("home", np.int64),
      ("lane_road", np.int64), ("lane", np.int64), ("is_lane", bool), ("is_driving", bool), ("left", float),
@@ -66,10 +66,14 @@ from that lane's centre [m]; until when it is left alone [s], and its offset alo
 step ago: time [s], road, s [m].
 """
 
-_NEW = np.zeros(1, dtype=KNOWN)
-for _name, _value in (("base", np.nan), ("place", np.nan), ("home_road", NOWHERE), ("lane_road", NOWHERE),
-                      ("foreign_until", -np.inf), ("last_time", np.inf)):  # fmt: skip
-    _NEW[_name] = _value
+
+def _new_vehicle() -> NDArray[Any]:
+    """Of whom nothing is known yet, shape (1,)."""
+    row = np.zeros(1, dtype=KNOWN_VEHICLE)
+    row[["base", "place", "home_road", "lane_road", "foreign_until", "last_time"]] = (
+        np.nan, np.nan, NO_ROAD_YET, NO_ROAD_YET, -np.inf, np.inf,
+    )  # fmt: skip
+    return row
 
 
 class LivePlaces(NamedTuple):
@@ -89,7 +93,7 @@ class LivePlaces(NamedTuple):
 class Ledger:
     """Who is where; `say` is told what a user has to know once: vehicle and kind, and a line.
 
-    States are rows of the player's (`esmini_library.STATE`); `known` has a row for each of `names`.
+    States are rows of the player's (`esmini_library.OBJECT_STATE`); `known` has a row for each of `names`.
     """
 
     def __init__(self, network: RoadNetwork, say: Callable[[tuple[str, str], str], None]) -> None:
@@ -98,7 +102,7 @@ class Ledger:
         self._numbers = np.array(sorted(numbers), dtype=np.int64)
         self._indices = np.array([numbers[number] for number in sorted(numbers)], dtype=np.int64)
         self.names: tuple[str, ...] = ()
-        self.known = np.zeros(0, dtype=KNOWN)
+        self.known = np.zeros(0, dtype=KNOWN_VEHICLE)
         self.rests: dict[str, Rest] = {}
 
     def expect(self, names: tuple[str, ...]) -> None:
@@ -106,7 +110,7 @@ class Ledger:
         if names != self.names:
             before = {name: row for row, name in enumerate(self.names)}
             old = [before.get(name, len(self.names)) for name in names]
-            self.names, self.known = names, np.concatenate([self.known, _NEW])[old]
+            self.names, self.known = names, np.concatenate([self.known, _new_vehicle()])[old]
             self.rests = {name: rest for name, rest in self.rests.items() if name in set(names)}
 
     # ---- lanes, of many places ---------------------------------------------------------------------------------------
@@ -239,7 +243,7 @@ class Ledger:
                 before = states["t"][k] - self.left_of(states[k : k + 1])[0] * known["place"][k]
                 home[k] = self.network.lane_at(int(road[k]), float(s[k]), float(before)).lane or lane[k]
             known["home_from"][k], known["home_to"][k] = begin, end
-        known["home_road"], known["home"] = np.where(road >= 0, road, NOWHERE), home
+        known["home_road"], known["home"] = np.where(road >= 0, road, NO_ROAD_YET), home
         return home
 
     def _look_up(

@@ -51,7 +51,7 @@ def _workers(stated: str) -> dict[str, Any]:
         raise ValueError(f"{stated!r} is neither a number nor the address of a dask scheduler") from error
 
 
-LIMITS = {"s": ("job_timeout", 1.0, 86_400.0), "MB": ("job_memory", 100.0, 1e6)}
+JOB_LIMIT_UNITS = {"s": ("job_timeout", 1.0, 86_400.0), "MB": ("job_memory", 100.0, 1e6)}
 """Unit of a limit of one scenario -> keyword, and between what it can be."""
 
 
@@ -60,7 +60,7 @@ def _limits(stated: Sequence[str]) -> dict[str, Any]:
     limits = dict[str, Any]()
     for text in stated:
         match = re.fullmatch(r"(\d+(?:\.\d+)?) ?(s|MB)", text)
-        name, least, most = LIMITS[match[2]] if match else ("", 0.0, 0.0)
+        name, least, most = JOB_LIMIT_UNITS[match[2]] if match else ("", 0.0, 0.0)
         if match is None or not least <= float(match[1]) <= most:
             raise ValueError(f"{text!r}, expected 1s to 86400s or 100MB to 1000000MB")
         limits[name] = float(match[1])

@@ -127,7 +127,7 @@ class _Origin:
         return cls(facts, scenario, replace(settings, **places), variant)
 
 
-ROADS = flag("--road", kind=list[Path] | None, metavar="FOLDER",
+ROADS_OPTION = flag("--road", kind=list[Path] | None, metavar="FOLDER",
     help='Folder with roads known by name ("Town04"); may be repeated.')  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def verify(
     *,
     library: Paths = (),
     allow: Paths = (),
-    road_path: Annotated[Paths, ROADS] = (),
+    road_path: Annotated[Paths, ROADS_OPTION] = (),
     fast: Annotated[bool, flag("--fast", help="Compare hashes alone; make nothing again.")] = False,
     workers: int = 0,
 ) -> Verification:
@@ -293,7 +293,7 @@ def reproduce(
     *,
     library: Paths = (),
     allow: Paths = (),
-    road_path: Annotated[Paths, ROADS] = (),
+    road_path: Annotated[Paths, ROADS_OPTION] = (),
     workers: Annotated[
         int, flag("--jobs", read=process_count, help="Of a folder: number of processes; -1: one per core.")
     ] = 1,

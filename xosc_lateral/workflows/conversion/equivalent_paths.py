@@ -11,7 +11,7 @@ from typing import TypeVar
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
-from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, NEW, Change, Comparison, largest_of, later
+from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, HOW_NEW, Change, Comparison, largest_of, later
 from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
@@ -51,7 +51,7 @@ class EquivalentPaths:
     def trial_contacts(self) -> tuple[str, ...]:
         """New contacts that only come about under other egos, a line each."""
         nominal = {change.pair for change in self.changes if change.run == NOMINAL_RUN}
-        return tuple(str(one) for one in self.changes if one.pair and one.how == NEW and one.pair not in nominal)
+        return tuple(str(one) for one in self.changes if one.pair and one.how == HOW_NEW and one.pair not in nominal)
 
     def warnings(self, unmoved: Collection[str], known: Collection[tuple[str, str]] = ()) -> Iterator[Note]:
         """Who stays as it is, whose moves are smaller, what takes much longer, what happens otherwise.

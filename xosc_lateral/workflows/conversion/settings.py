@@ -113,7 +113,7 @@ class ConvertSettings:
     # fmt: off
     profile: str | DriverProfile = option(
         AUTO, say.profile, "--profile", "-p", kind=list[str] | None, cell=say.profile_cell,
-        metavar="PROFILE|NAME=PROFILE", gives=say.profiles_named("profile", "entity"), show_default=False,
+        metavar="PROFILE|NAME=PROFILE", gives=say.profile_and_entities, show_default=False,
         help="Name or path of a driver profile; auto: motorway, the population (default). For one entity NAME=PROFILE; "
         "may be repeated.",
     )
@@ -175,7 +175,7 @@ class ConvertSettings:
     time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
     with_sensor: bool = option(
         False, bool, "--with", kind=list[Addition] | None, show_default=False,
-        gives=lambda stated: {f"{_KEYWORDS[one]}": True for one in stated},
+        gives=lambda stated: {_KEYWORDS[one]: True for one in stated},
         help="sensor: the error of the sensor that measured the drives, too; jam-corridor: below 40 km/h on motorways "
         "the leftmost lane keeps left, others right (assumed: nobody measured how far); may be repeated.",
     )

@@ -47,7 +47,7 @@ ROUNDING = 1e-6
 LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
-NEW = "is new"
+HOW_NEW = "is new"
 CONTACT_MOVED = 0.25
 """By which a contact comes earlier or later without a word. [s]"""
 LEAST_WAY = 1e-3
@@ -135,7 +135,7 @@ def compare_runs(
     for key, action in now.items():
         if key not in then and action.start <= before.end_time - EVENT_TOLERANCE:
             what, first = _named(key, action), (*key[:2], 0) not in then
-            how = NEW if first else "happens once more"
+            how = HOW_NEW if first else "happens once more"
             changes.setdefault(what, Change(what, key[1], action.start, how))
     others = [*_other_order(then, now), *_other_lanes(network, before, after, ignored)]
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
@@ -152,7 +152,7 @@ def compare_runs(
                 what = f"touches '{names[1]}' {later(time - at)} than"
                 findings.append(Finding("contact", names[0], at, abs(time - at), what))
         elif at is None or at + shifts.largest <= after.end_time - EVENT_TOLERANCE:
-            how = NEW if at is None else "no longer happens"
+            how = HOW_NEW if at is None else "no longer happens"
             what = f"contact of '{names[0]}' and '{names[1]}' at {time:.1f} s"
             changes.setdefault(what, Change(what, names[0], time, how, pair=names))
     return Comparison(tuple(event_shifts), tuple(changes.values()), tuple(findings))
