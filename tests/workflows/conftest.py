@@ -1,4 +1,4 @@
-"""Fits are quick: `tests/drivers/fitting`, `tests/extras/loop` and README's walk look at what comes out of them."""
+"""Fits are quick; `tests/drivers/fitting` and README's walk look at what comes out of them."""
 
 from __future__ import annotations
 

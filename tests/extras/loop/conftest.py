@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 from examples.driver_simulator.plants import Plant
 from examples.driver_simulator.simulator import Driver, simulate_drive
-from tests.kit.fits import coarse_fits
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.drives import read_drives
 
@@ -36,8 +35,3 @@ def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
     """Drives in a folder of the test's own."""
     return driver_in(tmp_path)
 
-
-@pytest.fixture(scope="package", autouse=True)
-def _coarse_fits() -> Iterator[None]:
-    with coarse_fits():
-        yield
