@@ -144,9 +144,21 @@ def actions(root: etree._Element) -> Iterator[str]:
             yield from (
                 f"OP.convert_maneuver_to_atomic: {action.tag}" for action in group if action.tag not in GROUPS | ACTIONS
             )
+        yield from (f"OP.convert_maneuver_to_atomic: {item.tag}" for item in story.iter("AbsoluteTargetLane"))
+        for item in story.iter("LongitudinalDistanceAction", "SynchronizeAction"):
+            if item.get("distance") is None and item.find("FinalSpeed") is None:
+                yield f"OP.convert_maneuver_to_atomic: {item.tag} without a distance or a final speed"
         for signal in story.iter("TrafficSignalStateAction"):
             if not signal.get("name").startswith(("id=", "pos=")):
                 yield "OP.get_traffic_light_from_osc_name: id=... or pos=..."
+
+
+def ways(root: etree._Element) -> Iterator[str]:
+    for item in root.find("Storyboard").iter("AcquirePositionAction", "AssignRouteAction"):
+        yield f"ChangeActorWaypoints: {item.tag} hands it no times, whose number it asks for"
+    for item in root.find("Storyboard").iter("AbsoluteTargetSpeed"):
+        if float(item.get("value")) < 0.0:
+            yield "VC and NPC.run_step: NotImplementedError for a speed below 0"
 
 
 def weather(root: etree._Element) -> Iterator[str]:
@@ -197,6 +209,7 @@ RULES: tuple[Rule, ...] = (
     trajectories,
     acts,
     actions,
+    ways,
     weather,
     names,
 )

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from math import remainder, tau
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
+from lxml import etree
 
+import xosc_lateral as xl
+from tests.kit import carla_stand_in, scenario_runner
 from tests.kit.profiles import simulated_profile
 from tests.kit.stage import line, map_of, road
 from xosc_lateral.base.errors import FormatError
@@ -147,3 +155,37 @@ def test_lane_offset_mode_is_refused(tmp_path: Path, maps: RoadSearch) -> None:
     with pytest.raises(FormatError, match="CARLA"):
         convert_scenario(source, tmp_path / "out.xosc", settings)
     assert not (tmp_path / "out.xosc").exists()
+
+
+TEMPLATES = ["braking-leader", "curves", "cut-in", "dense-traffic", "jam-end", "overtake-truck"]
+
+
+def _for_carla(name: str, folder: Path) -> tuple[xl.Conversion, Path]:
+    scenario, _ = xl.write_template(name, folder)
+    output = folder / "for_carla.xosc"
+    return xl.convert(scenario, output, seed=1, player="carla"), output
+
+
+def test_what_ends_the_parsers_run_is_left_out_of_who_stays_as_written(tmp_path: Path) -> None:
+    made, output = _for_carla("overtake-truck", tmp_path)  # its Ego changes lanes by the lanes' numbers
+    assert scenario_runner.broken(etree.parse(str(output)).getroot()) == []
+    assert any("AbsoluteTargetLane left out (ScenarioRunner changes lanes" in str(note) for note in made.messages)
+
+
+@pytest.mark.skipif("SCENARIO_RUNNER" not in os.environ, reason="SCENARIO_RUNNER names no checkout of ScenarioRunner")
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_its_own_code_ends_within_2_cm(name: str, tmp_path: Path) -> None:
+    """`SCENARIO_RUNNER_PYTHON` has what ScenarioRunner needs (py_trees 0.8, xmlschema, networkx, Shapely, six ...)."""
+    made, output = _for_carla(name, tmp_path)
+    python, rows = os.environ.get("SCENARIO_RUNNER_PYTHON", sys.executable), tmp_path / "rows.csv"
+    command = [python, carla_stand_in.__file__, os.environ["SCENARIO_RUNNER"], str(output), "300", str(rows)]
+    subprocess.run(command, check=True, timeout=300, capture_output=True)
+    driven = pd.read_csv(rows, names=["time", "name", "x", "y"])
+    written = play_scenario(output).motion
+    assert driven["time"].iloc[-1] == pytest.approx(written.end_time, abs=0.1)  # its acts end, and it with them
+    for entity in written.entities:
+        if entity.name in made.enriched:
+            frames = driven[(driven["name"] == entity.name) & (driven["time"] <= entity.time[-1])]
+            aside = np.hypot(*(frames[a] - np.interp(frames["time"], entity.time, getattr(entity, a)) for a in "xy"))
+            assert aside.iloc[-1] < 0.02
+            assert aside.max() < 0.05

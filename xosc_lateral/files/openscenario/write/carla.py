@@ -1,7 +1,8 @@
 """What CARLA's ScenarioRunner wants of a scenario; the one place of its quirks.
 
 From its published sources (0.9.16: `openscenario_configuration`, `openscenario_parser`, `open_scenario`,
-`actorcontrols`); `tests/kit/scenario_runner.py` holds them as assertions. CARLA itself is not run by any test.
+`actorcontrols`); `tests/kit/scenario_runner.py` holds them as assertions, and `tests/kit/carla_stand_in.py` runs them
+where they are there. CARLA itself is not run by any test.
 
 - Version 1.0 alone, and valid; no expressions, and parameters not everywhere: values are written.
 - Catalogs are looked for as ``FOLDER/VehicleCatalog.xosc``, of version 1.0: entries are written in place.
@@ -21,7 +22,7 @@ From its published sources (0.9.16: `openscenario_configuration`, `openscenario_
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import cos, sin
 
@@ -163,6 +164,10 @@ def _leave_out_unknown(losses: Losses, scenario: Scenario) -> None:
             known = ours or (tag == "TrafficSignalStateAction" and (item.get("name") or "").startswith(_SIGNALS))
             if not known or tag in ("VisibilityAction", "TrafficAction"):
                 losses.action(item, _UNKNOWN[tag])
+    for item in elements(losses.root, *_FAILS_AT):
+        why, fails = _FAILS_AT[local_name(item)]
+        if fails(item):
+            losses.action(item, f"ScenarioRunner {why}")
 
 
 _UNKNOWN = {
@@ -172,6 +177,15 @@ _UNKNOWN = {
     "TrafficSignalControllerAction": "ScenarioRunner has its own phases",
     "CustomCommandAction": "ScenarioRunner would run it as a script",
 }
+_FAILS_AT: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
+    "AbsoluteTargetLane": ("changes lanes by a number of lanes alone", lambda item: True),
+    "AbsoluteTargetSpeed": ("drives nobody backwards", lambda item: float(item.get("value") or 0.0) < 0.0),
+    "AcquirePositionAction": ("has no times for its way", lambda item: True),
+    "AssignRouteAction": ("has no times for its way", lambda item: True),
+    "LongitudinalDistanceAction": ("keeps distances in metres alone", lambda item: item.get("distance") is None),
+    "SynchronizeAction": ("wants a final speed", lambda item: item.find("{*}FinalSpeed") is None),
+}
+"""What ends its run, in actions of who is left as written."""
 
 
 def _note_ways(losses: Losses, motion: NominalMotion, name: str) -> None:
