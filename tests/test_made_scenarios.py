@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from laboratory.findings import schema_findings
-from laboratory.in_player import shifts
 from tests.kit.made.actions import ACTIONS
 from tests.kit.made.conditions import CONDITIONS
 from tests.kit.made.roads import ROADS
@@ -39,17 +37,3 @@ def test_they_are_played(tmp_path: Path) -> None:
         (tmp_path / "road.xodr").write_text(road, encoding="utf-8")
         (tmp_path / "made.xosc").write_text(scenario, encoding="utf-8")
         assert play_scenario(tmp_path / "made.xosc").motion.end_time == pytest.approx(LAST)
-
-
-def test_findings_of_a_file_with_a_comment_before_its_declaration(tmp_path: Path) -> None:
-    """As the product reads it: such files are in the field."""
-    path = tmp_path / "late.xosc"
-    path.write_text(f"<!-- first -->\n{made(1)[2]}")
-    assert not schema_findings(path)
-    path.write_text(path.read_text().replace("<Storyboard>", "<Other/><Storyboard>"))
-    assert schema_findings(path).total() == 1
-
-
-def test_shifts_count_what_was_due_before_the_end() -> None:
-    before, after = {"a": [1.0, 9.99], "b": [2.0, 3.0]}, {"a": [1.1, 10.6], "b": [2.0]}
-    assert shifts(before, after, 10.0) == (pytest.approx(0.1), 1)
