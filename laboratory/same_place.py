@@ -1,4 +1,4 @@
-"""Is the same driver at the same place alike? Laps of a closed road, and what a field along it per driver would predict.
+"""Is the same driver at the same place alike? Laps of a closed road, and what a field per driver would predict.
 
     python -m laboratory.same_place ASta_040719_platoon3.csv.gz ASta_050719_platoon1.csv.gz
 
