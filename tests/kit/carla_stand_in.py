@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import count
-from math import sqrt
+from math import cos, radians, sin, sqrt
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, Self
@@ -79,6 +79,9 @@ class Rotation:
     pitch: float = 0.0
     yaw: float = 0.0
     roll: float = 0.0
+
+    def get_forward_vector(self) -> Vector3D:
+        return Vector3D(cos(radians(self.yaw)), sin(radians(self.yaw)))
 
 
 @dataclass
@@ -253,6 +256,15 @@ class Client(Blank):
         return [SimpleNamespace(actor_id=body.id, error="") for body in bodies]
 
 
+class Named(type):
+    """A class that has a blank of every name, as an enumeration has."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return Blank()
+
+
 class Everything(ModuleType):
     """A module that has a blank class of every name."""
 
@@ -263,7 +275,7 @@ class Everything(ModuleType):
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        made = type(name, (Blank,), {}) if name[:1].isupper() else Blank()
+        made = Named(name, (Blank,), {}) if name[:1].isupper() else Blank()
         setattr(self, name, made)
         return made
 

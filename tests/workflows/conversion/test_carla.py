@@ -157,6 +157,27 @@ def test_lane_offset_mode_is_refused(tmp_path: Path, maps: RoadSearch) -> None:
     assert not (tmp_path / "out.xosc").exists()
 
 
+ROUTE = """<RoutePosition><RouteRef><Route name="route" closed="false">
+  <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="100"/></Position></Waypoint>
+  <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="900"/></Position></Waypoint>
+</Route></RouteRef><InRoutePosition><FromLaneCoordinates pathS="50" laneId="-1"/></InRoutePosition></RoutePosition>"""
+
+
+@pytest.mark.parametrize("about", ["CARLA:test", "test"])
+def test_who_stays_as_written_on_a_route_starts_where_that_is(tmp_path: Path, maps: RoadSearch, about: str) -> None:
+    source = _scenario(tmp_path, ROUTE, about)
+    xl.convert(source, tmp_path / "out.xosc", player="carla", road_path=maps.folders, ego=["hero"])
+    root = etree.parse(str(tmp_path / "out.xosc")).getroot()
+    assert scenario_runner.broken(root) == []
+    (place,) = root.iter("WorldPosition")
+    hero = play_scenario(source, roads=maps).motion.entities[0]
+    assert hero.s[0] == pytest.approx(150.0)
+    side = -1.0 if about.startswith("CARLA") else 1.0
+    assert [float(place.get(axis, "")) for axis in "xyh"] == pytest.approx(
+        [hero.x[0], side * hero.y[0], side * remainder(hero.heading[0], tau)], abs=1e-4
+    )
+
+
 TEMPLATES = ["braking-leader", "curves", "cut-in", "dense-traffic", "jam-end", "overtake-truck"]
 
 
@@ -177,15 +198,14 @@ def test_what_ends_the_parsers_run_is_left_out_of_who_stays_as_written(tmp_path:
 def test_its_own_code_ends_within_2_cm(name: str, tmp_path: Path) -> None:
     """`SCENARIO_RUNNER_PYTHON` has what ScenarioRunner needs (py_trees 0.8, xmlschema, networkx, Shapely, six ...)."""
     made, output = _for_carla(name, tmp_path)
-    python, rows = os.environ.get("SCENARIO_RUNNER_PYTHON", sys.executable), tmp_path / "rows.csv"
-    command = [python, carla_stand_in.__file__, os.environ["SCENARIO_RUNNER"], str(output), "300", str(rows)]
+    python, table = os.environ.get("SCENARIO_RUNNER_PYTHON", sys.executable), tmp_path / "rows.csv"
+    command = [python, carla_stand_in.__file__, os.environ["SCENARIO_RUNNER"], str(output), "300", str(table)]
     subprocess.run(command, check=True, timeout=300, capture_output=True)
-    driven = pd.read_csv(rows, names=["time", "name", "x", "y"])
-    written = play_scenario(output).motion
-    assert driven["time"].iloc[-1] == pytest.approx(written.end_time, abs=0.1)  # its acts end, and it with them
-    for entity in written.entities:
-        if entity.name in made.enriched:
-            frames = driven[(driven["name"] == entity.name) & (driven["time"] <= entity.time[-1])]
-            aside = np.hypot(*(frames[a] - np.interp(frames["time"], entity.time, getattr(entity, a)) for a in "xy"))
-            assert aside.iloc[-1] < 0.02
-            assert aside.max() < 0.05
+    driven = pd.read_csv(table, names=["time", "name", "x", "y"])
+    meant = made.to_frame()
+    assert driven["time"].iloc[-1] == pytest.approx(meant["time"].max(), abs=0.1)  # its acts end, and it with them
+    for called, rows in meant[meant["name"].isin(made.enriched)].groupby("name"):
+        frames = driven[(driven["name"] == called) & (driven["time"] <= rows["time"].max())]
+        aside = np.hypot(*(frames[axis] - np.interp(frames["time"], rows["time"], rows[axis]) for axis in "xy"))
+        assert aside.iloc[-1] < 0.02
+        assert aside.max() < 0.05

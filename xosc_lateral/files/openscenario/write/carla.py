@@ -8,7 +8,7 @@ where they are there. CARLA itself is not run by any test.
 - Catalogs are looked for as ``FOLDER/VehicleCatalog.xosc``, of version 1.0: entries are written in place.
 - The default control moves waypoints to the middle of their lane. `CONTROL_NAME` goes to them as they are, at their
   times, which count from when it got them: every drive begins at 0 s. Without a next waypoint it fails, so a last one
-  lies an hour ahead. It divides by the time left to the next one: vertices lie between its frames, not on them.
+  lies an hour ahead. It divides by the time left to the next one: vertices lie late between its frames, not on them.
 - One waypoint list per drive, stops included: a new one would begin up to a frame late.
 - A storyboard's stop trigger is only looked at for criteria; acts end by their own.
 - One vehicle is the ego, by a property; else nothing is watched.
@@ -35,7 +35,7 @@ from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import TimedVertices
 from xosc_lateral.files.openscenario.write.draft import Draft
 from xosc_lateral.files.openscenario.write.losses import Losses, remove
-from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, wrapped
+from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, moving_entities, wrapped
 from xosc_lateral.files.openscenario.write.older import add_missing_overrides
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, RowStretch, vertex_times
@@ -48,6 +48,11 @@ CONTROL_NAME = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""
 FRAME_TIME = 0.05
 """Its default frame. [s]"""
+_PHASE = 0.8
+"""Where in a frame vertices lie. [-] A velocity that reaches one in time is kept for a whole frame, which leaves
+1 - 1 / phase of what was amiss: all of it, to and fro, amid frames; a quarter here; on a frame no time is left."""
+_SETTLING = 3
+"""Vertices after a stop, a frame apart: what a stop within a frame leaves, half a frame's way, falls to a hundredth."""
 HOLD_DURATION = 3600.0
 """How long after a drive its last waypoint is due. [s]"""
 VERSION = (1, 0)
@@ -120,14 +125,15 @@ def _vertices(item: Moving, pieces: Sequence[RowStretch], begin: float) -> tuple
 
 
 def _moments(item: Moving, pieces: Sequence[RowStretch], begin: float) -> FloatArray:
-    """Times of the vertices, amid frames, from `begin` on. [s]"""
+    """Times of the vertices, between frames, from `begin` on. [s]"""
     path, times = item.path, [begin]
     for piece in pieces:
         rows = slice(piece.first, piece.last + 1)
         times += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        times.append(float(path.time[piece.last]) + FRAME_TIME)
-    between = (np.floor((np.array(times[1:]) - begin) / FRAME_TIME - 0.5) + 0.5) * FRAME_TIME
-    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME_TIME)))
+        after = np.arange(1, _SETTLING + 1 if piece.stops else 2)
+        times += (float(path.time[piece.last]) + FRAME_TIME * after).tolist()
+    between = (np.floor((np.array(times[1:]) - begin) / FRAME_TIME - _PHASE) + _PHASE) * FRAME_TIME
+    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), _PHASE * FRAME_TIME)))
     return np.asarray(moments)
 
 
@@ -144,6 +150,7 @@ def fit_carla(losses: Losses, draft: Draft, converted: Sequence[str]) -> None:
         _note_ways(losses, motion, name)
     _entities(losses, scenario, converted)
     _assign_controls(root, [e for e in scenario.entities if e.name in converted])
+    _places_on_routes(losses, draft)
     for position in root.iter("{*}WorldPosition"):
         if not scenario.header.is_left_handed:
             position.set("p", "0")
@@ -186,6 +193,21 @@ _FAILS_AT: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
     "SynchronizeAction": ("wants a final speed", lambda item: item.find("{*}FinalSpeed") is None),
 }
 """What ends its run, in actions of who is left as written."""
+
+
+def _places_on_routes(losses: Losses, draft: Draft) -> None:
+    """Where an entity starts is known from the run; elsewhere there are none for it."""
+    for item in elements(losses.root, "RoutePosition"):
+        names = [owner.get("entityRef") for owner in item.iterancestors("{*}Private")]
+        starts = moving_entities(draft, {one.name: one for one in draft.motion.entities if one.name in names})
+        place = item.getparent()
+        owner = None if place is None else place.getparent()
+        if not starts or place is None or owner is None:
+            losses.element(item, "ScenarioRunner has no places on routes")
+            continue
+        remove(place)
+        for start in starts.values():
+            build.world_position(owner, start.pose(0))
 
 
 def _note_ways(losses: Losses, motion: NominalMotion, name: str) -> None:
