@@ -33,6 +33,7 @@ def run(core: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*command, *words], cwd=core, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.pages
 def test_the_core_alone_converts_to_the_same_bytes(core: Path) -> None:
     scenario, _ = xl.write_template("cut-in", core)
     done = run(core, "convert", scenario.name, "-o", "alone.xosc", "--seed", "3", "--time-limit", "12")

@@ -36,6 +36,7 @@ def test_a_workflow_is_yaml_and_its_commands_work_in_their_order(
     assert {path.name for path in Path().glob("*/*.xosc")} == {"cut-in.xosc"} and list(Path("reports").glob("*.html"))
 
 
+@pytest.mark.pages
 def test_hooks_name_commands_that_there_are_and_the_files_that_they_are_for(tmp_path: Path) -> None:
     hooks = {one["id"]: one for one in yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))}
     scenario, _ = xl.write_template("cut-in", tmp_path)
@@ -67,6 +68,7 @@ def test_the_conda_recipe_says_what_pyproject_says() -> None:
     assert recipe["build"]["python"]["entry_points"] == entries
 
 
+@pytest.mark.pages
 def test_the_action_runs_as_bash_runs_it(tmp_path: Path) -> None:
     """Its steps but for the installation, in their order, with their environment; no input becomes code."""
     action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))

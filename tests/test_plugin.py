@@ -69,6 +69,7 @@ def run(site: Path, cwd: Path, *words: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.pages
 def test_an_importer_is_a_verb_of_import(site, tmp_path):
     log = tmp_path / "anna.log"
     time = np.arange(0.0, 30.0, 0.04)

@@ -42,6 +42,7 @@ def test_columns_of_blocks_are_those_of_the_whole() -> None:
         assert together[1].base is not None and together[1].strides == (0,), "one value in memory"
 
 
+@pytest.mark.pages
 def test_what_drivers_see_is_gone_before_paths_are_made(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty columns a driver: of an hour of 500 cars they are three gigabytes."""
     monkeypatch.setattr(enrich, "KEPT_ROWS", 0)

@@ -201,6 +201,7 @@ def with_tiers() -> list[Any]:
     ]
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("line", with_tiers())
 def test_an_example_of_a_help_runs(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     for words, package in NEEDED.items():

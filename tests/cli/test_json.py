@@ -47,6 +47,7 @@ def test_every_schema_is_one_and_is_listed():
         assert f"schemas/{path.name}" in LISTED
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize(
     ("name", "words"),
     [

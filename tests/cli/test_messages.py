@@ -53,6 +53,7 @@ def test_a_copy_of_what_lies_elsewhere_is_named_as_its_owner_knows_it():
     assert copy.to_dict()["path"] == "s3://bucket/a.xosc"
 
 
+@pytest.mark.pages
 def test_a_repair_of_the_road_is_told_by_every_verb_that_plays(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     repaired = "geometry of length 0 m left out"
@@ -70,6 +71,7 @@ def test_a_repair_of_the_road_is_told_by_every_verb_that_plays(folder, monkeypat
     assert "geometry of length 0 m left out" in xl.play("cut-in.xosc").page()
 
 
+@pytest.mark.pages
 def test_strict_refuses_exactly_what_is_a_warning(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     verbs = {

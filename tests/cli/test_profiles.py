@@ -129,6 +129,7 @@ def test_adding_does_not_replace_and_export_writes_what_was_there(team, tmp_path
     assert (tmp_path / "driver-03.json").read_bytes() == (team / "driver-03.json").read_bytes()
 
 
+@pytest.mark.pages
 def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
     for name, figure in (("left", ["--mean", 0.6]), ("wide", ["--sdlp", 0.45])):
         assert run(capsys, "profiles", "derive", "motorway", "-o", tmp_path / f"{name}.json", *figure)[0] == 0

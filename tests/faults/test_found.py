@@ -213,6 +213,7 @@ def test_the_lock_is_an_event_where_the_log_is_json(tmp_path, capsys):
     assert event["event"] == "error" and "another run" in event["error"]["message"]
 
 
+@pytest.mark.pages
 def test_drives_that_are_all_the_same_show_no_difference_between_drivers(drive, tmp_path, capsys):
     twice = tmp_path / "again.csv"
     twice.write_bytes(drive.read_bytes())

@@ -16,6 +16,7 @@ COUNT = 10
 """Mutants of each reader and kind, fewer of the slow ones: half a minute together."""
 
 
+@pytest.mark.pages
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
 def test_mutants_are_refused_in_one_line_or_make_sense(reader: Reader, tmp_path: Path) -> None:
@@ -31,6 +32,7 @@ def test_mutants_are_refused_in_one_line_or_make_sense(reader: Reader, tmp_path:
         assert tally.refused + tally.accepted == max(1, round(reader.share * COUNT))
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("door", DOORS)
 def test_lines_of_a_simulation_are_answered_in_one_line_and_refused_ones_change_nothing(
     door: str, tmp_path: Path

@@ -72,6 +72,7 @@ def test_a_file_that_was_read_elsewhere_counts_as_an_input_here(file: Path) -> N
     assert process_of(file) == process_of(file)  # one process reads many files
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize(
     ("how", "what"),
     [
@@ -111,6 +112,7 @@ def test_a_process_waits_longer_than_a_file_may_take(file: Path, monkeypatch: py
     assert process_of(file) == process
 
 
+@pytest.mark.pages
 def test_a_process_that_was_ended_meanwhile_is_replaced(file: Path) -> None:
     process = process_of(file)
     os.kill(process, signal.SIGKILL)
@@ -128,6 +130,7 @@ def test_threads_read_beside_each_other(file: Path) -> None:
     assert len(found) == 3
 
 
+@pytest.mark.pages
 def test_nothing_is_imported_from_the_working_folder(tmp_path: Path) -> None:
     (tmp_path / "numpy.py").write_text("open('planted', 'w')")
     pd.DataFrame({"time": [0.0, 0.2], "x": [1.0, 2.0]}).to_parquet(tmp_path / "a.parquet")

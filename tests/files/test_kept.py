@@ -7,6 +7,7 @@ import pytest
 from tests.kit.kept import WRITTEN, difference, kept, outputs
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("seed", WRITTEN)
 def test_a_made_scenario_is_written_as_it_was(seed: int) -> None:
     assert not difference(outputs(seed), kept("written")[str(seed)])

@@ -127,6 +127,7 @@ def test_a_text_without_a_number_is_named_with_its_row(tmp_path: Path) -> None:
     assert "fahrt.csv:2" in str(error.value)
 
 
+@pytest.mark.pages
 def test_from_raw_files_to_a_tagged_library_in_five_commands(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -90,6 +90,7 @@ def _actions(scenario: Scenario) -> tuple[PlayedAction, ...]:
     return tuple(played)
 
 
+@pytest.mark.pages
 def test_what_is_written_from_the_reference_logs_is_valid_and_loads(shared: Path, tmp_path: Path) -> None:
     schemas = {v: etree.XMLSchema(etree.parse(str(XSD / f"OpenSCENARIO-{name}.xsd"))) for v, name in FILES.items()}
     written = 0

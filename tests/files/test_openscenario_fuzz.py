@@ -160,6 +160,7 @@ def test_the_files_load_before_they_are_mutated(tmp_path: Path) -> None:
     assert len(list(read_distribution(tmp_path / "logical.xosc").parameter_sets())) == 3
 
 
+@pytest.mark.pages
 @fuzz
 @given(data=st.data())
 def test_mutated_scenarios(folder: Path, data: st.DataObject) -> None:

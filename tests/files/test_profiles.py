@@ -41,6 +41,7 @@ def profile(request: pytest.FixtureRequest) -> DriverProfile:
     return replace(simulated_profile(request.param), effects=effects)
 
 
+@pytest.mark.pages
 def test_reading_what_was_written_gives_the_same_bytes(profile: DriverProfile, tmp_path: Path) -> None:
     path = tmp_path / "p.json"
     write_profile(profile, path)

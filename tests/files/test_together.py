@@ -120,6 +120,7 @@ def verb(
     return second, content(old), content(new), old
 
 
+@pytest.mark.pages
 def test_a_killed_run_leaves_the_old_output_or_the_new_one(
     verb, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -139,6 +140,7 @@ def test_a_killed_run_leaves_the_old_output_or_the_new_one(
         assert content(state) in (old, new), state
 
 
+@pytest.mark.pages
 def test_a_full_disk_leaves_the_old_output_as_it_was(verb, tmp_path: Path) -> None:
     run, old, new, folder = verb
     changed = [len(data) for name, data in new.items() if old.get(name) != data]

@@ -176,6 +176,7 @@ def long_table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "drive.csv"
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("form", FORMS)
 def test_every_verb_takes_drives_in_every_form(long_table: Path, form: str) -> None:
     coarse = xl.read_profile("rural")

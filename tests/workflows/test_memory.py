@@ -57,6 +57,7 @@ def template(tmp_path_factory) -> tuple[Path, Path]:
     return renamed, road
 
 
+@pytest.mark.pages
 def test_every_kind_gives_the_bytes_that_its_file_gives(template):
     scenario, road = template
     expected = xl.convert(scenario, seed=3).data
@@ -87,6 +88,7 @@ def test_a_scenario_just_made_is_converted_and_comes_back_as_such():
     assert there == pytest.approx(wanted, abs=0.02)
 
 
+@pytest.mark.pages
 def test_names_lead_where_the_scenario_says(template):
     text, road = template[0].read_text(encoding="utf-8"), template[1].read_bytes()
     moved = text.replace(f'"{template[1].name}"', '"../xodr/a &amp; b.xodr"')
@@ -130,6 +132,7 @@ def test_what_is_not_given_is_not_looked_for_on_a_disk(template, monkeypatch):
         xl.convert(outside)
 
 
+@pytest.mark.pages
 def test_an_output_on_a_disk_keeps_references_and_is_verified_beside_its_files(template, tmp_path):
     scenario, road = (path.read_bytes() for path in template)
     result = xl.convert(scenario, tmp_path / "out.xosc", road=road, seed=2)
@@ -164,6 +167,7 @@ print([one for one in opened if len(one) > 1 and isinstance(one[1], str) and set
 """
 
 
+@pytest.mark.pages
 def test_no_file_is_touched(template):
     done = subprocess.run([sys.executable, "-c", WATCH, *template], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["[]", "[]"]

@@ -53,6 +53,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
 }
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", RESULTS)
 def test_a_result_is_a_value(name: str, inputs: Path, tmp_path: Path) -> None:
     with warnings.catch_warnings():

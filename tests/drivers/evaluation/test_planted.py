@@ -36,6 +36,7 @@ def test_through_whatever_sensor_the_driver_himself_is_like_and_another_is_not(t
     assert found["driver"] == "unlike" and "mean square about the measured mean" in words, (name, words)
 
 
+@pytest.mark.pages
 def test_a_classifier_does_not_tell_the_driver_himself_by_what_two_rates_leave_of_a_sensor(truth):
     """Above 1.5 Hz noise that was recorded at 20 Hz is a hundredth of what it is at 5 Hz: a logarithm sees that."""
     drives = recorded(truth, 1, 0.03, 20.0)

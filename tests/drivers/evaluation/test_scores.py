@@ -192,6 +192,7 @@ def test_a_profile_is_as_close_to_what_it_generates_as_that_is_to_itself(profile
     assert scores.margins_sampled.share_near == pytest.approx(scores.margins_real.share_near, abs=0.03)
 
 
+@pytest.mark.pages
 def test_a_foreign_driver_is_far_away(profile):
     restless = score_profile(profile, _swaying(4, 12, spread=0.5), seed=1, classify=False)
     assert restless.snippets.ratio > 2.0
@@ -228,6 +229,7 @@ def test_first_evaluation_is_the_real_drive_but_for_the_shift(profile):
     assert first.distances.by_metric["mean"] < min(one.distances.by_metric["mean"] for one in scores.evaluations[1::2])
 
 
+@pytest.mark.pages
 def test_same_seed_same_scores_and_json_holds_them_all(profile):
     runs = _swaying(8, 6)
     first, again = (json.dumps(scores_to_dict(score_profile(profile, runs, seed=5, classify=False))) for _ in range(2))

@@ -60,6 +60,7 @@ def test_most_of_the_time_near_a_line_with_little_movement_is_had_beside_it(base
     assert f"for which he drives {abs(made.reached.mean):.2f} m {side} of the lane's middle" in str(made)
 
 
+@pytest.mark.pages
 def test_a_memory_slows_the_movement_down(base: DriverProfile) -> None:
     known = derive(base, Asked(), "x").reached
     made = derive(base, Asked(memory=1.3 * known.memory, sdlp=known.sdlp), "x")
@@ -67,6 +68,7 @@ def test_a_memory_slows_the_movement_down(base: DriverProfile) -> None:
     assert made.reached.restlessness < 0.85 * known.restlessness
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("model", ["two-level", "autoregressive"])
 def test_any_model_can_be_another_driver(model: str) -> None:
     profile = simulated_profile(model)
@@ -85,6 +87,7 @@ def test_of_a_population_the_typical_driver_is_taken_and_a_truck_is_what_it_know
     assert means.std() / 20**0.5 < 0.005, "one driver's means differ by chance alone"
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
@@ -106,6 +109,7 @@ def test_what_cannot_be_is_refused_with_the_reason(base: DriverProfile, asked: d
         derive(base, Asked(**asked), "x")  # type: ignore[arg-type]
 
 
+@pytest.mark.pages
 def test_the_file_says_of_what_it_is_made_and_converts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "tired.json"
     assert main(["profiles", "derive", "motorway-vehicle-1", "--preset", "drowsy", "-o", str(path)]) == 0

@@ -156,6 +156,7 @@ def test_a_two_level_profile_has_no_fast_part() -> None:
         fast_part_of(simulated_profile("two-level"))
 
 
+@pytest.mark.pages
 def test_movement_below_the_band_stays_and_above_is_the_fast_parts() -> None:
     profile = simulated_profile("best")
     made = with_fast_part(profile, fast_part_of_runs(runs_at(SPEEDS), 1.0, "planted"), 0.1)

@@ -64,6 +64,7 @@ def test_a_free_run_covers_the_drive_but_for_its_lane_changes(drives: list[Drive
         assert all(np.isfinite(run.offset).all() for run in own)
 
 
+@pytest.mark.pages
 def test_sampled_tables_are_fitted_as_they_are(drives: list[Drive], tmp_path: Path) -> None:
     """Without a step at lane changes: no lateral speed of metres a second."""
     profile, width = simulated_profile(), float(np.median(np.concatenate([drive.lane_width for drive in drives])))

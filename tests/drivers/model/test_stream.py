@@ -296,6 +296,7 @@ def _leaves(values: object, path: tuple[object, ...] = ()) -> list[tuple[object,
     return below + ([path] if not isinstance(values, dict) else [])
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("rate", [None, 50.0])
 def test_an_edited_state_is_refused_or_leads_to_offsets_of_a_lane(rate: float | None) -> None:
     profile, chance = read_profile(REFINED), random.Random(7)

@@ -34,12 +34,14 @@ def test_each_set_is_a_cut_in_of_its_own(found: CutIns) -> None:
     assert not frame["seen"].isna().any() and (frame["lead"].isna() == ~frame["seen"]).all()
 
 
+@pytest.mark.pages
 def test_the_same_seed_gives_the_same_table_and_parts_make_the_whole(found: CutIns, scenario: Path) -> None:
     options = {"like": "motorway", "count": COUNT, "replace": True, "detectors": ["lateral-speed"], "seed": 3}
     rows = [row for part in ("1/2", "2/2") for row in xl.detect(scenario, shard=part, **options).rows]
     assert sorted(map(str, rows)) == sorted(map(str, found.rows))
 
 
+@pytest.mark.pages
 def test_files_are_kept_and_are_what_was_counted(scenario: Path, tmp_path: Path, capsys) -> None:
     table, page, kept = tmp_path / "table.csv", tmp_path / "page.html", tmp_path / "kept"
     words = ["--like", "motorway", "--count", "2", "--detector", "lateral-speed", "--keep", str(kept)]
@@ -53,6 +55,7 @@ def test_files_are_kept_and_are_what_was_counted(scenario: Path, tmp_path: Path,
         assert "xosc-lateral provenance" in path.read_text() and xl.play(path).to_frame()["name"].nunique() > 1
 
 
+@pytest.mark.pages
 def test_a_distribution_has_a_drive_for_each_set(scenario: Path, tmp_path: Path) -> None:
     made = xl.vary(scenario, f"{tmp_path}/varied/", like="motorway", count=2, seed=1)
     xl.convert_many([made.distribution], tmp_path / "out", allow=[tmp_path, scenario.parent])

@@ -128,6 +128,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.pages
 def test_a_program_of_ones_own_gets_its_row_in_one_line_whatever_its_scores_are(folder, capsys):
     (folder / "mine.py").write_text(OWN)
     words = ["detect", "cut-in.xosc", "--home", "home", "--variants", "1", "--ego", "none", "--tune", "20/h"]

@@ -146,6 +146,7 @@ def test_claims_of_ones_own(read, tmp_path):
         xl.dossier("motorway", claims=own)
 
 
+@pytest.mark.pages
 def test_a_folder_and_what_was_edited_in_it(tmp_path):
     xl.write_template("braking-leader", tmp_path / "in")
     xl.convert_many(tmp_path / "in", tmp_path / "out", variants=2)

@@ -278,6 +278,7 @@ def test_effects_and_models_of_plug_ins_are_refused_by_name(tmp_path: Path) -> N
     assert not (tmp_path / "c").exists()
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_it_compiles_without_a_warning_and_the_example_runs_under_sanitizers(name: str, tmp_path: Path) -> None:
     write_profile(two_level(), tmp_path / "two.json")
@@ -402,6 +403,7 @@ def test_nobody_is_led_beyond_one_and_a_half_lanes(push: float, most: float, tmp
         assert largest > 0.9 * abs(push) or abs(push) > most
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", ["offset", "rate", "heading", "seed", "fault", "position", "following"])
 def test_a_column_called_as_a_variable_of_all_units_is_refused(name: str, tmp_path: Path) -> None:
     effect = Linear(acts=Acts.LOCATION, column=name, coefficients=(0.1,), errors=(0.1,), reference=(0.0,))

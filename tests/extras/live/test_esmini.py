@@ -71,6 +71,7 @@ def test_vehicles_are_where_their_drivers_say_and_maneuvers_stay_as_written(libr
     assert (turned - road).max() < LARGEST_TURN_RATE * 0.02
 
 
+@pytest.mark.pages
 def test_an_offset_is_led_out_where_a_trajectory_starts_without_it(library: Any, tmp_path: Path) -> None:
     """In the middle of the lane from 4 s on, for 10 s."""
     at = [f'<LanePosition roadId="1" laneId="-1" s="{s}"/>' for s in range(150, 401, 10)]
@@ -171,6 +172,7 @@ def test_an_ego_that_nobody_drives_and_names_that_nobody_has_are_said() -> None:
         live_esmini(CUT_IN, StandIn(), profiles={"Trcuk": "motorway"}, duration=1.0)
 
 
+@pytest.mark.pages
 def test_neighbours_give_way_to_the_ego_where_it_really_is() -> None:
     ends = {}
     for aside in (0.0, 0.6):  # the ego leans to the left, towards who overtakes it

@@ -196,6 +196,7 @@ def test_under_a_context_that_changes_gently_it_is_what_is_sampled_a_preview_lat
     np.testing.assert_allclose(run(unit, context, 0.2)[rows[known], 0], sampled.offset[known], atol=1e-9, rtol=0.0)
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("version", VERSIONS)
 def test_slow_driving_maneuvers_and_surprises_are_as_in_live_traffic(version: str, tmp_path: Path) -> None:
     compiler()

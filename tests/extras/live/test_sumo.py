@@ -180,6 +180,7 @@ def test_a_vehicle_that_says_nonsense_or_vanishes_is_left_alone_and_the_others_d
     assert all(np.isfinite(offset) for offset, _ in traffic.moves.values())
 
 
+@pytest.mark.pages
 def test_a_road_may_be_empty_for_a_while(tmp_path: Path) -> None:
     config = write_run(tmp_path, end=140.0)
     cars = "".join(f'<vehicle id="v{t}" route="r" depart="{t}" departSpeed="max"/>' for t in (0, 90))

@@ -100,6 +100,7 @@ def test_a_nominal_offset_is_kept_and_the_driver_is_added(profile: DriverProfile
     np.testing.assert_allclose(moved, plain + 0.5, atol=1e-12)
 
 
+@pytest.mark.pages
 def test_slow_cars_move_less_and_standing_ones_not_at_all(profile: DriverProfile) -> None:
     traffic = Traffic(profile, seed=4)
     moves = drive(traffic, 5.0)

@@ -168,6 +168,7 @@ def test_what_drives_can_show_is_stated_for_every_look() -> None:
     assert plan["x", "mean"].smallest == by_x.smallest
 
 
+@pytest.mark.pages
 def test_an_effect_of_the_stated_size_is_found_in_most_and_of_a_third_in_few() -> None:
     found = {1.0: 0, 0.33: 0}
     for seed in range(40, 44):

@@ -101,6 +101,7 @@ def goes_through(coarse: Coarse, terms: Sequence[Term], folder: Path) -> Fitted:
     return fitted
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
 def test_every_shape_acts_on_everything(coarse: Coarse, shape: ColumnEffect, tmp_path: Path) -> None:
     kinds: list[type[ColumnTerm]] = [MeanTerm, SpreadTerm, SlowSpreadTerm, FineNoiseTerm]
@@ -168,6 +169,7 @@ def campaign() -> Coarse:
     return coarse_of(movement(rng, 180.0 * drives) * (1.0 + 0.3 * passengers), context, drives=drives)
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("shape", SHAPES, ids=NAMES)
 def test_every_shape_acts_between_drives(campaign: Coarse, shape: ColumnEffect, tmp_path: Path) -> None:
     goes_through(campaign, [BetweenTerm.of(structs.replace(shape, response_s=60.0))], tmp_path)

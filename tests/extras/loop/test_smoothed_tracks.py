@@ -43,6 +43,7 @@ def test_a_refined_profile_moves_above_the_band_as_the_one_that_it_began_with() 
     assert ("gust",) in {effect.columns for effect in refined.effects if isinstance(effect, ColumnEffect)}
 
 
+@pytest.mark.pages
 def test_a_refined_profile_says_where_it_is_valid() -> None:
     low, high = _refined(0.15, read_profile("motorway")).validity.bands
     assert low.source == "1 drive"

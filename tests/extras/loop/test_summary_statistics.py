@@ -103,6 +103,7 @@ def test_what_is_expected_is_the_mean_over_runs() -> None:
 
 
 # ---- its floor -------------------------------------------------------------------------------------------------------
+@pytest.mark.pages
 def test_a_floor_is_the_standard_error_of_a_mean_over_independent_blocks() -> None:
     """Blocks of a minute with a level of their own: a bin over all of them is sure to sigma / sqrt(blocks)."""
     rng = np.random.default_rng(8)

@@ -247,6 +247,7 @@ def dlr_full(dlr_csv: tuple[Path, pd.DataFrame]) -> ImportedDrives:
     return import_dlr_ht(dlr_csv[0], keep_cut=True)
 
 
+@pytest.mark.pages
 def test_dlr_offsets_come_back_without_lane_geometry(dlr_csv, dlr_full):
     truth, full = dlr_csv[1], dlr_full.table
     table = full[full["state"] == "kept"]
@@ -306,6 +307,7 @@ def test_dlr_reads_csv_zip_and_wheel_alike(dlr_csv, tmp_path):
     pd.testing.assert_frame_equal(tables[0], tables[2])
 
 
+@pytest.mark.pages
 def test_import_verb_writes_a_table_with_its_provenance(dlr_csv, tmp_path, capsys):
     path, _ = dlr_csv
     out = tmp_path / "dlr.parquet"

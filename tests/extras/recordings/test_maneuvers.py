@@ -234,6 +234,7 @@ def test_drivers_move_before_a_lane_change_whose_begin_they_know(
     assert not moved(own, only=["Ego"], ego=["none"]).abs().max() > 1e-9
 
 
+@pytest.mark.pages
 def test_in_reactive_outputs_they_do_where_the_begin_is_known(profile: Path, tmp_path: Path) -> None:
     scenario, _ = xl.write_template("cut-in", tmp_path)
     own = xl.read_profile(profile)
@@ -253,6 +254,7 @@ def test_in_reactive_outputs_they_do_where_the_begin_is_known(profile: Path, tmp
     assert (played(own, "reacts", "Ego") == played(without, "still", "Ego")).all()  # it begins by a distance to Ego
 
 
+@pytest.mark.pages
 def test_fit_holds_the_law_of_a_recording(recording: tuple[Path, Path], found: Maneuvers) -> None:
     drives = simulate_drive(400.0, seed=5).table
     path, road = recording

@@ -218,6 +218,7 @@ CLOCKS = {
 }
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("clock", CLOCKS)
 @pytest.mark.parametrize("sign", ["m", "-cm", "distances"])
 @pytest.mark.parametrize("rate", [5.0, 30.0, 100.0])

@@ -181,6 +181,7 @@ def test_the_same_recording_gives_the_same_bytes(tracks, road, tmp_path):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
 
 
+@pytest.mark.pages
 def test_the_table_of_drivers_makes_a_twin(tracks, road, tmp_path):
     made = xl.reconstruct(tracks, tmp_path / "out", road=road, columns=COLUMNS, host="A")
     profiles = {row["entity"]: row["profile"] for row in made.to_dict()["vehicles"]}

@@ -17,6 +17,7 @@ from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import made_vehicle
 
 
+@pytest.mark.pages
 def test_a_road_out_of_nothing_but_tracks_has_their_lanes(tmp_path):
     tracks, truth = _dlr_recording(seed=11)
     path = tmp_path / "trajectories_1.csv"

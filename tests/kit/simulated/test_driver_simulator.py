@@ -111,6 +111,7 @@ def test_a_shift_of_the_target_moves_the_car_by_as_much(plant):
     assert np.mean(slopes) == pytest.approx(1.0, abs=0.3)
 
 
+@pytest.mark.pages
 def test_an_ordinary_driver_neither_cuts_curves_nor_is_carried_out_of_them():
     """Mean slope of the offset on the shift that a curve cutter of 0.25 m would show; scatters by 0.26 per drive."""
     slopes = []

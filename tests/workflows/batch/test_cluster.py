@@ -57,6 +57,7 @@ def test_a_scenario_that_kills_every_worker_costs_one_row(tmp_path: Path, cluste
     assert len(outcomes) == 5
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("is_lost", [True, False])
 def test_a_result_that_comes_as_its_worker_dies_is_lost_and_not_a_bug(is_lost: bool) -> None:
     async def result_of(*, raiseit: bool) -> object:

@@ -33,6 +33,7 @@ NOT_YET = sorted({*packages_distributions(), "pickle", "numpy", "typer"} - {"xos
 """Names of modules that are imported after our own first line."""
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("how", ["script", "module"])
 def test_modules_in_the_folder_of_scenarios_never_run(tmp_path: Path, how: str) -> None:
     database, mark, script = tmp_path / "db", tmp_path / "ran", tmp_path / "bin" / "run.py"
@@ -151,6 +152,7 @@ def _answer_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, 2), (signal.SIGTERM, 1), (signal.SIGHUP, 1)])
 def test_a_signal_is_one_line_with_the_number_of_finished_outputs(
     tmp_path: Path, number: signal.Signals, workers: int

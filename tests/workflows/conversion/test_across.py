@@ -99,6 +99,7 @@ def test_who_waits_for_its_end_is_not_kept_waiting(tmp_path: Path) -> None:
     assert ends[1] == pytest.approx(ends[0], abs=0.05)
 
 
+@pytest.mark.pages
 def test_what_is_not_known_before_keeps_the_written_way_and_ends_where_its_driver_is(tmp_path: Path) -> None:
     path = scenario(tmp_path, trigger=TRIGGER)
     text = path.read_text()
@@ -152,6 +153,7 @@ def test_a_lane_change_by_a_rate_keeps_it_in_proportion_to_its_way(tmp_path: Pat
     assert lasts[1] == pytest.approx(lasts[0], abs=0.05)
 
 
+@pytest.mark.pages
 def test_only_the_vehicle_whose_way_moves_an_event_keeps_the_written_one(tmp_path: Path) -> None:
     waits = (  # B brakes when A is nearly in its lane, where the bell comes at another time
         "<ByEntityCondition><TriggeringEntities "

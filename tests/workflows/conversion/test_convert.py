@@ -96,6 +96,7 @@ def test_provenance_names_seed_profile_version_and_the_hash_of_every_input(tmp_p
     assert all(digest in text for _, digest in conversion.provenance.profiles.values())
 
 
+@pytest.mark.pages
 def test_the_command_line_writes_variants_and_reports_and_says_where(
     tmp_path: Path, profile: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,6 +22,7 @@ def endless(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.pages
 def test_offsets_follow_so_many_runs_of_an_action(endless: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(equivalent_paths, "MOST_TRIALS", 1)  # more would make the moves smaller
     result = xl.convert(endless, time_limit=24.0)

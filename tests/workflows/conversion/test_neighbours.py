@@ -52,6 +52,7 @@ def test_rows_of_a_table_choose_and_a_wrong_word_is_named_with_its_line(tmp_path
         list(read_request_table(frame, ConvertSettings()))
 
 
+@pytest.mark.pages
 def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(
     tmp_path: Path, configuration: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

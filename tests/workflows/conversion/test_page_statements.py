@@ -96,6 +96,7 @@ def numbers(rows: list[dict[str, str]], column: str) -> list[float]:
     return [float(row[column]) for row in rows if row[column] != "–"]
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize(("kind", "options"), KINDS)
 def test_no_two_numbers_for_one_name(kind: str | int, options: dict[str, Any], tmp_path: Path) -> None:
     made = xl.convert(scenario_of(kind, tmp_path), **options)

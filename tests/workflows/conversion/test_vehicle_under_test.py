@@ -298,6 +298,7 @@ def test_a_vehicle_under_test_can_not_be_enriched_and_none_stands_alone(
     assert main([*words, "--ego", "none", "--ego", "A"]) == 2
 
 
+@pytest.mark.pages
 def test_who_is_called_ego_is_left_as_it_is_and_said(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

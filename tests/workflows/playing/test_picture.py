@@ -67,6 +67,7 @@ def test_pixels_are_where_the_vehicles_are(made, tmp_path):
     assert first.color == color_of([one.name for one in made.movement.entities].index(first.label))
 
 
+@pytest.mark.pages
 def test_a_run_becomes_a_gif_in_real_time(tmp_path):
     image_module = pytest.importorskip("PIL.Image")
     scenario, _ = xl.write_template("cut-in", tmp_path)

@@ -46,6 +46,7 @@ def profile(table: Path) -> Path:
     return path
 
 
+@pytest.mark.pages
 def test_evaluate_prints_one_json_object_with_everything(table, profile, capsys):
     assert main(["evaluate", "-p", str(profile), str(table), "--json", "--no-classify"]) == 0
     values = json.loads(capsys.readouterr().out)
@@ -65,6 +66,7 @@ def test_a_profile_scored_on_the_drives_it_was_fitted_to_says_so(table, profile,
     assert "was fitted to these drives" in capsys.readouterr().out
 
 
+@pytest.mark.pages
 def test_traces_of_measured_drives_stand_beside_sampled_ones(table, profile):
     from xosc_lateral import evaluate
 
@@ -86,6 +88,7 @@ def test_a_profiles_card_is_a_page(tmp_path):
     assert "Driver profile motorway" in html and html.count("<figure") == 2
 
 
+@pytest.mark.pages
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
     assert main(["evaluate", "-p", str(profile), str(table), "--no-classify"]) == 0
     text = capsys.readouterr().out
@@ -148,6 +151,7 @@ def test_a_refined_profile_says_what_the_loop_found():
     assert f"found: {', '.join(loop['found'])}" in card_text(refined)
 
 
+@pytest.mark.pages
 def test_a_shipped_card_says_what_the_look_at_the_fit_found_and_where_the_recording_ends(capsys):
     card = card_text(read_profile("motorway"))
     assert re.search(r"within 1.2 m of a marking [\d.]+% of the time, [\d.]+ excursions an hour, as measured", card)
@@ -219,6 +223,7 @@ def test_a_profile_has_the_same_figures_wherever_they_are_stated(capsys):
     assert listed and all("in the recording" in line for line in listed)
 
 
+@pytest.mark.pages
 def test_each_pair_of_profiles_has_a_verdict_and_none_is_alike_that_differs(capsys):
     assert main(["profiles", "compare", "motorway", "motorway-vehicle-1", "rural"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -85,6 +85,7 @@ def test_what_cannot_be_read_is_said_and_ends_in_an_error(tmp_path: Path, capsys
         assert "xosc-lateral check day.csv --report PAGE.html" in capsys.readouterr().err
 
 
+@pytest.mark.pages
 def test_page_and_text_say_what_the_fit_says(tmp_path: Path) -> None:
     path = tmp_path / "day.csv"
     pd.DataFrame({"time": TIME, "offset": OFFSET, "lane_width": 3.6, "speed": 30.0}).to_csv(path, index=False)

@@ -39,6 +39,7 @@ def test_distance_of_hand_made_boxes(other: EntityMotion, expected: float) -> No
     assert box_distance(_corners(_box(0.0, 0.0)), _corners(other))[0] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.pages
 def test_distance_of_random_boxes_is_that_between_points_on_their_edges() -> None:
     rng = np.random.default_rng(5)
     share = np.linspace(0.0, 1.0, 400)[:, None]

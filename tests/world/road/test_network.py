@@ -55,6 +55,7 @@ def test_places_agree_with_the_reference_road_manager_to_a_millimetre(reference)
     assert count == 2314 - len(STALE)
 
 
+@pytest.mark.pages
 @pytest.mark.parametrize("name", ["alks_road_different_curvatures", "e6mini", "curves", "jolengatan"])
 def test_reference_lines_and_lane_edges_agree_with_an_independent_package(shared, name):
     from pyxodr.road_objects.network import RoadNetwork as IndependentNetwork

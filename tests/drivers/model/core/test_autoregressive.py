@@ -217,6 +217,7 @@ def test_tiny_data_can_be_fitted_and_sampled(seconds: float) -> None:
     assert 0.1 < values.std() / run.std() < 5.0
 
 
+@pytest.mark.pages
 def test_a_smooth_wave_and_pure_noise_can_be_fitted_and_sampled() -> None:
     wave = 0.1 * np.sin(2 * np.pi * np.arange(3000) / 60)
     noise = 0.02 * np.random.default_rng(0).normal(size=3000)
