@@ -164,27 +164,23 @@ def fit_carla(losses: Losses, draft: Draft, converted: Sequence[str]) -> None:
 
 
 def _leave_out_unknown(losses: Losses, scenario: Scenario) -> None:
-    ours = scenario.header.is_left_handed
-    for story in losses.root.iter("{*}Story"):
-        for item in elements(story, *_UNKNOWN):
-            tag = local_name(item)
-            known = ours or (tag == "TrafficSignalStateAction" and (item.get("name") or "").startswith(_SIGNALS))
-            if not known or tag in ("VisibilityAction", "TrafficAction"):
-                losses.action(item, _UNKNOWN[tag])
-    for item in elements(losses.root, *_FAILS_AT):
-        why, fails = _FAILS_AT[local_name(item)]
-        if fails(item):
+    for item in elements(losses.root, *_UNKNOWN):
+        why, is_unknown = _UNKNOWN[local_name(item)]
+        if is_unknown(item) and not (scenario.header.is_left_handed and local_name(item) in _ITS_OWN):
             losses.action(item, f"ScenarioRunner {why}")
 
 
-_UNKNOWN = {
-    "VisibilityAction": "ScenarioRunner has none",
-    "TrafficAction": "ScenarioRunner has none",
-    "TrafficSignalStateAction": "ScenarioRunner finds signals by 'id=' or 'pos=' alone",
-    "TrafficSignalControllerAction": "ScenarioRunner has its own phases",
-    "CustomCommandAction": "ScenarioRunner would run it as a script",
-}
-_FAILS_AT: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
+_ITS_OWN = ("TrafficSignalStateAction", "TrafficSignalControllerAction", "CustomCommandAction")
+"""What a scenario written for CARLA means as ScenarioRunner does."""
+_UNKNOWN: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
+    "VisibilityAction": ("has none", lambda item: True),
+    "TrafficAction": ("has none", lambda item: True),
+    "TrafficSignalStateAction": (
+        "finds signals by 'id=' or 'pos=' alone",
+        lambda item: not (item.get("name") or "").startswith(_SIGNALS),
+    ),
+    "TrafficSignalControllerAction": ("has its own phases", lambda item: True),
+    "CustomCommandAction": ("would run it as a script", lambda item: True),
     "AbsoluteTargetLane": ("changes lanes by a number of lanes alone", lambda item: True),
     "AbsoluteTargetSpeed": ("drives nobody backwards", lambda item: float(item.get("value") or 0.0) < 0.0),
     "AcquirePositionAction": ("has no times for its way", lambda item: True),
@@ -192,7 +188,7 @@ _FAILS_AT: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
     "LongitudinalDistanceAction": ("keeps distances in metres alone", lambda item: item.get("distance") is None),
     "SynchronizeAction": ("wants a final speed", lambda item: item.find("{*}FinalSpeed") is None),
 }
-"""What ends its run, in actions of who is left as written."""
+"""Actions that it does not take, or that end its run."""
 
 
 def _places_on_routes(losses: Losses, draft: Draft) -> None:
