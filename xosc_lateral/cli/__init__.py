@@ -109,7 +109,8 @@ class _Verbs(TyperGroup):
         if known is None:
             return name, known, rest
         command = verb(str(name))
-        return name, command, todays(rest, {flag for param in command.params for flag in param.opts})
+        asked: Any = getattr(command, "commands", {}).get(next(iter(rest), ""), command)  # of a group: one of its verbs
+        return name, command, todays(rest, {flag for param in asked.params for flag in param.opts})
 
 
 app = typer.Typer(

@@ -30,6 +30,7 @@ FORMER_OPTIONS = {
     "--player-library": ("--player", "{}"), "--job-timeout": ("--job-limit", "{}s"),
     "--job-memory": ("--job-limit", "{}MB"), "--log-json": ("--json", "--verbose"), "--train": ("--home", "{}"),
     "--for": ("--player", "{}"), "--resample": ("--attempts", "{}"), "--only": ("--enrich", "{}"),
+    "--vehicle": ("--profile", "{}"),
 }  # fmt: skip
 """What was an option of a verb that has it no more -> what is said today, and its value."""
 

@@ -332,13 +332,13 @@ def roads(stated: Sequence[Path]) -> dict[str, Any]:
     return {**({"road": files[0]} if files else {}), **({"road_path": folders} if folders else {})}
 
 
-def profile_and_entities(stated: Sequence[str]) -> dict[str, Any]:
-    """A profile for everybody, and those of single entities: ``PROFILE`` and ``NAME=PROFILE``."""
+def profile_and_entities(stated: Sequence[str], keyword: str = "entity") -> dict[str, Any]:
+    """A profile for everybody, and those of single entities, for `keyword`: ``PROFILE`` and ``NAME=PROFILE``."""
     named = [word for word in stated if "=" in word and not Path(word).exists()]
     plain = [word for word in stated if word not in named]
     if len(plain) > 1:
         raise ValueError(f"{plain[0]} and {plain[1]}: one profile for everybody, others as NAME=PROFILE")
-    return {**({"profile": plain[0]} if plain else {}), **({"entity": named} if named else {})}
+    return {**({"profile": plain[0]} if plain else {}), **({keyword: named} if named else {})}
 
 
 class Part(StrEnum):

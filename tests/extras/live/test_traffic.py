@@ -254,7 +254,7 @@ def test_on_the_other_side_of_the_road_he_does_the_mirror_image(profile: DriverP
         (None, (), "Ego", True),
         (None, (), "hero_2", True),
         (None, (), "Egon", False),
-        (None, ("Ego",), "Ego", False),  # --vehicle Ego=PROFILE
+        (None, ("Ego",), "Ego", False),  # -p Ego=PROFILE
         ("none", (), "Ego", False),
         (["none"], (), "Ego", False),
         ((), (), "Ego", False),

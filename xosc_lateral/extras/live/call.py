@@ -15,7 +15,7 @@ from xosc_lateral.base.plugins import service
 from xosc_lateral.extras.live.loop import later_actions, not_driven, run_to_end
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import RECOGNISED_BY
-from xosc_lateral.workflows.options import SHARED, declare_options, flag, texts
+from xosc_lateral.workflows.options import SHARED, declare_options, flag, profile_and_entities, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
 if TYPE_CHECKING:
@@ -28,8 +28,10 @@ TRACE_COLUMNS = (*STATE_COLUMNS, "z", "pitch", "roll")
 """The same with what only a trace has."""
 
 
-PROFILES = flag("--vehicle", kind=list[str] | None, read=texts, metavar="NAME=PROFILE",
-    help="Another profile for one vehicle; may be repeated.")  # fmt: skip
+PROFILE = flag("--profile", "-p", kind=list[str] | None, metavar="PROFILE|NAME=PROFILE", show_default=False,
+    gives=partial(profile_and_entities, keyword="profiles"),
+    help="Driver profile (default motorway). For one vehicle NAME=PROFILE; may be repeated.")  # fmt: skip
+PROFILES = flag(kind=list[str] | None, read=texts, said_by="--profile", help="Another profile for one vehicle.")
 EGO = flag(
     kind=list[str] | None,
     metavar="NAME",
@@ -47,7 +49,7 @@ def live_esmini(
     duration: Annotated[float, flag(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, flag(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
     window: Annotated[bool, flag("--window", help="Open esmini's window.")] = False,
-    profile: ProfileLike = "motorway",
+    profile: Annotated[ProfileLike, PROFILE] = "motorway",
     profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
     ego: Annotated[Sequence[str] | None, EGO] = None,
     seed: int = 0,
@@ -101,7 +103,7 @@ def live_sumo(
         max=1e7)] = 86_400.0,
     lateral_resolution: Annotated[float | None,
         flag(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0)] = None,
-    profile: ProfileLike = "motorway",
+    profile: Annotated[ProfileLike, PROFILE] = "motorway",
     profiles: Annotated[Mapping[str, ProfileLike] | None, PROFILES] = None,
     ego: Annotated[Sequence[str] | None, EGO] = None,
     seed: int = 0,
