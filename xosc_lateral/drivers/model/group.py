@@ -280,8 +280,7 @@ class OffsetGroup:
     def draw_ahead(self) -> bool:
         """Have more rows drawn of the driver with the fewest, while no step is due; False: all have enough."""
         left = self._state["left"]
-        needs = not self._rated and left.min(initial=2 * ROWS_DRAWN) <= ROWS_DRAWN
-        if needs:
+        if needs := not self._rated and left.min(initial=2 * ROWS_DRAWN) <= ROWS_DRAWN:
             self._draw_more(int(np.argmin(left)))
         return bool(needs)
 
