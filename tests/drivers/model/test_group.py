@@ -64,6 +64,8 @@ def test_each_driver_is_the_stream_of_his_seed_whoever_comes_and_goes(name: str)
         group.add([seeds[k] for k in new])
         there += new
         curves = group.advance({column: values[there] for column, values in context.items()}, width[there])
+        for _ in range(tick % 3):  # whatever is drawn meanwhile
+            group.draw_ahead()
         if tick == 50:  # through a file, and on
             state = json.loads(json.dumps(group.to_dict()))
             group = OffsetGroup(profile, COLUMNS)
@@ -73,6 +75,20 @@ def test_each_driver_is_the_stream_of_his_seed_whoever_comes_and_goes(name: str)
             for quarter in range(4):
                 wanted = streams[k].step(own)
                 assert np.polyval(curves[row][::-1], quarter / 4) == pytest.approx(wanted, abs=1e-12), (tick, k)
+
+
+def test_no_step_has_to_draw_what_was_drawn_between_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    group, drawn = OffsetGroup(read_profile("motorway-vehicle-1"), ()), list[int]()
+    group.add([np.random.SeedSequence(3, spawn_key=(k,)) for k in range(3)])
+    group.advance({}, np.full(3, 3.6))
+    monkeypatch.setattr(group, "_draw_more", lambda k, draw=group._draw_more: (drawn.append(k), draw(k)))
+    for _ in range(200):
+        while group.draw_ahead():
+            pass
+        between = len(drawn)
+        group.advance({}, np.full(3, 3.6))
+        assert len(drawn) == between
+    assert set(drawn) == {0, 1, 2}
 
 
 def test_in_even_traffic_a_driver_has_the_offsets_that_are_sampled() -> None:

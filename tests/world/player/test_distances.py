@@ -13,6 +13,7 @@ from tests.kit.stage import Stage, arc, car, line, map_of, road
 from xosc_lateral.world.player.distances import (
     Measure,
     RoadGap,
+    Spot,
     ahead_and_left,
     apart,
     free_road_gap,
@@ -216,11 +217,15 @@ def test_cars_that_touch_have_no_free_space(world: World, system: CoordinateSyst
     assert distance(world, own, other, system, kind, freespace=True) == 0.0
 
 
+def _point(state: EntityState) -> Spot:
+    return Spot(state.pose.x, state.pose.y, state.road, state.lane, state.s, state.t)
+
+
 def test_free_space_to_a_point(world: World) -> None:
-    own, spot = world.put(0, -1, 100.0), spot_of(world.put(1, -1, 140.0))
+    own, spot = world.put(0, -1, 100.0), _point(world.put(1, -1, 140.0))
     assert Measure(ENTITY, AHEAD, freespace=True).to_spot(own, spot) == pytest.approx(36.0)
     assert Measure(ROAD, AHEAD, freespace=True).to_spot(own, spot) == pytest.approx(36.0, abs=1e-6)
-    inside = spot_of(world.put(1, -1, 101.0))
+    inside = _point(world.put(1, -1, 101.0))
     assert Measure(ENTITY, STRAIGHT_WAY, freespace=True).to_spot(own, inside) == 0.0
 
 

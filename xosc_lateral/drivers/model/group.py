@@ -271,17 +271,24 @@ class OffsetGroup:
 
     def _draw(self, drivers: IntArray) -> None:
         """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
-        remaining = self._state["left"]
-        if remaining.min(initial=2 * ROWS_DRAWN) > ROWS_DRAWN:
-            return
-        due = set(drivers[remaining[drivers] == 0].tolist())
-        spare = drivers[remaining[drivers] <= ROWS_DRAWN]
-        few = spare[np.argsort(remaining[spare], kind="stable")[: 1 + 2 * len(self) // ROWS_DRAWN]]
-        for k in sorted(due | set(few.tolist())):
-            driver, left = self._state[k], remaining[k]
-            driver["drawn"][:left] = driver["drawn"][driver["at"] : driver["at"] + left]
-            driver["mean"], driver["drawn"][left : left + ROWS_DRAWN] = self._block(k)
-            driver["at"], driver["left"] = 0, left + ROWS_DRAWN
+        left = self._state["left"][drivers]
+        none, few = (np.count_nonzero(left <= most) for most in (0, ROWS_DRAWN // 2))
+        count = max(none, min(few, 1 + 2 * len(self) // ROWS_DRAWN))
+        for k in drivers[np.argsort(left, kind="stable")[:count]].tolist():
+            self._draw_more(k)
+
+    def draw_ahead(self) -> bool:
+        """Have more rows drawn of the driver with the fewest, while no step is due; False: all have enough."""
+        left = self._state["left"]
+        if needs := not self._rated and left.min(initial=2 * ROWS_DRAWN) <= ROWS_DRAWN:
+            self._draw_more(int(np.argmin(left)))
+        return bool(needs)
+
+    def _draw_more(self, k: int) -> None:
+        driver, left = self._state[k], self._state["left"][k]
+        driver["drawn"][:left] = driver["drawn"][driver["at"] : driver["at"] + left]
+        driver["mean"], driver["drawn"][left : left + ROWS_DRAWN] = self._block(k)
+        driver["at"], driver["left"] = 0, left + ROWS_DRAWN
 
     def _block(self, k: int) -> tuple[float, FloatArray]:
         """Mean, and the `ROWS_DRAWN` rows of a drive that come after all that is drawn, shape (BLOCK, parts)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import View
 from xosc_lateral.extras.detect.scoring import Tally, alarms_in_words, cut_ins_of, plain
-from xosc_lateral.extras.detect.sources import SourceSettings, converted, played_scene
+from xosc_lateral.extras.detect.sources import SourceSettings, converted
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
 from xosc_lateral.extras.detect.vary import Variations, vary
 from xosc_lateral.files.atomic import write_atomically
@@ -59,15 +60,10 @@ def cut_ins_like(
             settings.convert, profile=law, ego=chosen, allow=(*allowed, folder), step=STEP
         )  # as it is played
         sets = concrete(Request(made.distribution, convert), document_kind(made.distribution))
-        for number, (source, suffix, requested, _) in enumerate(sets):
-            if number % part[1] != part[0] - 1:
-                continue
-            conversion, played = converted(source, requested, number)
+        for number, (source, suffix, requested, _) in islice(enumerate(sets), part[0] - 1, None, part[1]):
+            conversion, scene = converted(source, requested, number, f"{scenario.stem}{suffix}", ego)
             if keep is not None and conversion.data is not None:
                 write_atomically(keep / f"{source.stem}{suffix}_lifelike.xosc", conversion.data)
-            scene = played_scene(
-                played, f"{scenario.stem}{suffix}", ego or next(iter(conversion.provenance.ego), "none")
-            )
             views = settings.views(scene)
             tallies = [Tally(detector, scene.name) for detector in detectors]
             for tally in tallies:

@@ -29,10 +29,11 @@ from xosc_lateral.files.held import Held, exists
 from xosc_lateral.files.mapping import TableMapping, as_mapping
 from xosc_lateral.files.openscenario.distribution import read_distribution
 from xosc_lateral.files.openscenario.read import read_scenario
+from xosc_lateral.files.openscenario.write.replay import STOP_TRIGGER
 from xosc_lateral.files.tables import TABLE_SUFFIXES
 from xosc_lateral.workflows.batch.request import SCENARIO_SUFFIX, DocumentKind, Request, concrete, document_kind
 from xosc_lateral.workflows.conversion.conversion import Conversion
-from xosc_lateral.workflows.conversion.convert import carry_out
+from xosc_lateral.workflows.conversion.convert import carried_out, conversion_of
 from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.conversion.plan import chosen_egos, decide
 from xosc_lateral.workflows.conversion.prepared import prepare
@@ -139,7 +140,9 @@ def _measured(path: Path, settings: SourceSettings) -> Source:
 def _written(named: Sequence[Named], settings: SourceSettings) -> Iterator[Scene]:
     """Each scenario as it is."""
     for scenario, name, convert, _ in named:
-        yield played_scene(_play(scenario, convert), name, settings.ego)
+        played = play_scenario(scenario, parameters=convert.parameters, step=STEP, time_limit=convert.time_limit,
+                               allowed=convert.allow, roads=convert.roads)  # fmt: skip
+        yield played_scene(played, name, settings.ego)
 
 
 def _lifelike(named: Sequence[Named], profile: str, settings: SourceSettings) -> Iterator[Scene]:
@@ -149,23 +152,22 @@ def _lifelike(named: Sequence[Named], profile: str, settings: SourceSettings) ->
         convert = replace(requested, profile=profile, ego=ego)
         for variant in range(settings.variants):
             index = number * settings.variants + variant  # each set has offsets of its own
-            made, played = converted(scenario, convert, index)
-            ego_name = settings.ego or next(iter(made.provenance.ego), "none")
-            yield played_scene(played, f"{name} #{variant + 1}", ego_name, cluster=name)
+            yield converted(scenario, convert, index, f"{name} #{variant + 1}", settings.ego, cluster=name)[1]
 
 
-def converted(scenario: Path, convert: ConvertSettings, index: int) -> tuple[Conversion, Played]:
-    """The variant of a number, from 0, in memory, and as what is written plays."""
+def converted(
+    scenario: Path, convert: ConvertSettings, index: int, name: str, ego: str | None, *, cluster: str = ""
+) -> tuple[Conversion, Scene]:
+    """The variant of a number, from 0, in memory, and tracks as what is written plays; see `played_scene`."""
     prepared = prepare(scenario, convert)
-    made = carry_out(decide(prepared, convert, output=scenario, variant_index=index, saves=False))
-    written = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
-    motion = play(written, prepared.played.network, step=STEP, time_limit=convert.time_limit)
-    return made, Played(written, prepared.played.network, motion)
-
-
-def _play(scenario: Path, convert: ConvertSettings) -> Played:
-    return play_scenario(scenario, parameters=convert.parameters, step=STEP, time_limit=convert.time_limit,
-                         allowed=convert.allow, roads=convert.roads)  # fmt: skip
+    plan = decide(prepared, convert, output=scenario, variant_index=index, saves=False)
+    written = carried_out(plan)
+    made, played = conversion_of(plan, written), written.played
+    if played is None or played.motion.step != STEP or played.motion.ended_by != STOP_TRIGGER:
+        read = read_scenario(scenario, allowed=convert.allow, roads=convert.roads, data=made.data)
+        run = play(read, prepared.played.network, step=STEP, time_limit=convert.time_limit)
+        played = Played(read, prepared.played.network, run)
+    return made, played_scene(played, name, ego or next(iter(made.provenance.ego), "none"), cluster=cluster)
 
 
 def played_scene(played: Played, name: str, ego: str | None, *, cluster: str = "") -> Scene:

@@ -8,7 +8,7 @@ nothing is reported: both would write the same place. Whose place is whose: `esm
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,9 @@ class EsminiTraffic:
             there = ", ".join(sorted(names))
             raise SimulationError(f"there is no vehicle {missing[0]!r} in the scenario (vehicles: {there})")
         self._moved: tuple[tuple[str, ...], Moves | None] = ((), None)
-        self._why: dict[tuple[str, int, int], str] = {}
+        self._signs: list[tuple[str, int, int]] = []
+        self._why: list[str] = []
+        self._is_truck = np.zeros(0, dtype=np.bool_)
         self._named: tuple[str, ...] = ()
         self._units = np.zeros(0, dtype=np.int64)
         pulled_by = {entity.trailer: entity.name for entity in model.entities if entity.trailer is not None}
@@ -247,11 +249,10 @@ class EsminiTraffic:
     def _tell(self, rows: IntArray, states: NDArray[Any], t: FloatArray) -> None:
         """Report places of vehicles [m], and the speeds that there are; who stands is where he is."""
         is_moving = np.abs(states["speed"]) > AT_REST
-        speak, place = self.player.SE_ReportObjectSpeed, self.player.SE_ReportObjectLateralPosition
-        on = (column[is_moving].tolist() for column in (states["id"], states["speed"], t))
-        for number, speed, at in zip(*on, strict=True):
-            speak(number, speed)
-            place(number, at)
+        numbers, speeds, at = (column[is_moving].tolist() for column in (states["id"], states["speed"], t))
+        for report, values in ((self.player.SE_ReportObjectSpeed, speeds),
+                               (self.player.SE_ReportObjectLateralPosition, at)):  # fmt: skip
+            deque(map(report, numbers, values), maxlen=0)  # whatever it answers
         self._ledger.tell(rows, states, np.where(is_moving, t, states["t"]))
 
     def _say(self, key: tuple[str, str], line: str) -> None:
@@ -293,11 +294,10 @@ class EsminiTraffic:
         names = tuple([self._ledger.names[row] for row in rows.tolist()])
         now, busy = float(self.player.SE_GetSimulationTime()), self._busy()
         signs = list(zip(names, states["ctrl_type"].tolist(), states["category"].tolist(), strict=True))
-        for sign in signs:
-            if sign not in self._why:
-                self._why[sign] = self._why_not_ours(*sign)
-        why = [self._why[sign] for sign in signs]
-        is_ours = np.array([not reason for reason in why], dtype=np.bool_)
+        if signs != self._signs:
+            self._signs, self._why = signs, [self._why_not_ours(*sign) for sign in signs]
+            self._is_truck = np.isin(states["category"], _TRUCK_CATEGORIES)
+        is_ours = np.array([not reason for reason in self._why], dtype=np.bool_)
         touched = busy | self._touched
         in_action = np.array([name in touched for name in names], dtype=np.bool_) if touched else np.zeros_like(is_ours)
         places = self._ledger.places(
@@ -305,7 +305,7 @@ class EsminiTraffic:
         )
         for k in np.flatnonzero(~self._ledger.known["steered"][rows] & ~(is_ours & places.is_free)).tolist():
             moved = "it is moved sideways all the time" if names[k] in busy else "it is in no lane for driving"
-            self.undriven[names[k]] = why[k] or moved
+            self.undriven[names[k]] = self._why[k] or moved
         self._ledger.rests = {name: rest for name, rest in self._ledger.rests.items() if name in busy}
         self._touched.clear()
         if names != self._named:
@@ -314,7 +314,7 @@ class EsminiTraffic:
             self._named, self._units = names, np.array([units[first[name]] for name in names], dtype=np.int64)
         moment = Moment(
             names, states["speed"], places.width, places.offset, places.is_free, is_ours,
-            np.isin(states["category"], _TRUCK_CATEGORIES), base=places.base,
+            self._is_truck, base=places.base,
             places=Places(
                 states["x"], states["y"], places.heading, places.road, places.lane, states["s"], states["length"],
                 states["width"], states["center_x"], self._units,

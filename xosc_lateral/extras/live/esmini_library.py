@@ -75,8 +75,8 @@ class EsminiLibrary:
             typed = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
             setattr(self, name, typed or getattr(library, name))
         self._is_known = False
-        self._ids: list[int] = []
-        self._names: list[str] = []
+        self._asked: tuple[list[int], list[int]] = ([], [])
+        self._names: tuple[str, ...] = ()
         self._states = np.zeros(0, dtype=OBJECT_STATE)
         self.heard: list[tuple[bytes, int, int, bytes]] = []
         """Changes of storyboard elements while `open_player` opened a scenario."""
@@ -93,29 +93,28 @@ class EsminiLibrary:
     def state(self, number: int) -> ObjectState | None:
         """Of an object; None if there is none. Raises `SimulationError`: the library has another structure."""
         state = ObjectState()
-        if not self._is_known:
-            self._compare(number)
+        self._compare(number)
         return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
 
     def objects(self) -> tuple[tuple[str, ...], NDArray[Any]]:
         """Names and states (`OBJECT_STATE`) of all objects that have one, shape (n,). Raises as `state`."""
+        if len(self._names) == self.SE_GetNumberOfObjects() and not any(map(self.SE_GetObjectState, *self._asked)):
+            return self._names, self._states.copy()  # the same as before: who has gone has no state
         ids = [self.SE_GetId(index) for index in range(self.SE_GetNumberOfObjects())]
-        if ids != self._ids:  # names are asked for once
-            self._ids, self._states = ids, np.zeros(len(ids), dtype=OBJECT_STATE)
-            self._names = [(self.SE_GetObjectName(number) or b"").decode() for number in ids]
         for number in ids:
-            if self._is_known:
-                break
             self._compare(number)
-        begin, size, read = self._states.ctypes.data, OBJECT_STATE.itemsize, self.SE_GetObjectState
-        there = [row for row, number in enumerate(ids) if read(number, begin + row * size) == 0]
-        return tuple([self._names[row] for row in there]), self._states[there]
+        states = np.zeros(len(ids), dtype=OBJECT_STATE)
+        places = [states.ctypes.data + row * OBJECT_STATE.itemsize for row in range(len(ids))]
+        there = [row for row, both in enumerate(zip(ids, places, strict=True)) if self.SE_GetObjectState(*both) == 0]
+        self._names = tuple([(self.SE_GetObjectName(ids[row]) or b"").decode() for row in there])
+        self._states, self._asked = states, (ids, places)
+        return self._names, states[there]
 
     def _compare(self, number: int) -> None:
-        """Refuse another structure than ours: longer, shorter, or with something else first."""
+        """Refuse, at the first object, another structure than ours: longer, shorter, or with something else first."""
         size, spare = c.sizeof(ObjectState), 256
         buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED_BYTE] * (size + spare)))
-        if self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
+        if self._is_known or self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
             return
         end = ObjectState.visibility
         last, beyond = bytes(buffer[end.offset : end.offset + end.size]), bytes(buffer[size:])

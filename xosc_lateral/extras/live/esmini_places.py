@@ -134,14 +134,19 @@ class Ledger:
         """Of travel along lanes, in inertial coordinates as the player's. [rad]"""
         return self.network.lane_to_world(road, lane, s).heading + self.network.header_offset.heading
 
-    def left_of(self, states: NDArray[Any], on_lane: BoolArray | None = None) -> FloatArray:
-        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1; shape (n,)."""
+    def left_of(
+        self, states: NDArray[Any], on_lane: BoolArray | None = None, heading: FloatArray | None = None
+    ) -> FloatArray:
+        """+1 where +t is to the left of where a vehicle drives, on whichever lane it is, else -1; shape (n,).
+
+        `on_lane`, `heading` [rad]: whether there is that lane, and where it leads, where that is known already.
+        """
         road, lane, left = self.roads_of(states), states["lane"], np.ones(len(states))
         on = road >= 0
         left[on] = self.network.travel_directions(road[on], lane[on])
         there = np.flatnonzero(self._has_lane(road, lane, states["s"]) if on_lane is None else on_lane)
         if len(there):
-            ahead = self._headings(road[there], lane[there], states["s"][there])
+            ahead = self._headings(road[there], lane[there], states["s"][there]) if heading is None else heading[there]
             left[there] *= np.where(np.cos(states["h"][there] - ahead) >= 0.0, 1.0, -1.0)
         return left
 
@@ -262,8 +267,8 @@ class Ledger:
             width[on], is_driving[on] = self.network.lane_width(*where), self.network.lane_index(*where)[0] >= 0
             heading[on] = self._headings(*where)
         looked_up = {"lane_road": road, "lane": home, "is_lane": is_lane, "is_driving": is_driving & (width > 0.0),
-                 "left": self.left_of(states, on_lane), "width": np.maximum(width, 1e-3),
-                 "heading": heading}  # fmt: skip
+                 "left": self.left_of(states, on_lane, None if other.any() else heading),
+                 "width": np.maximum(width, 1e-3), "heading": heading}  # fmt: skip
         for name, values in looked_up.items():
             known[name][rows] = values
 

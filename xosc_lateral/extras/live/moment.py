@@ -5,11 +5,11 @@ Gaps and sides are those of `around`, as in `context`, there for one vehicle at 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.world.road.network import RoadNetwork
@@ -30,11 +30,12 @@ class Roads(Protocol):
     def path(self, road: int, lane: int, s: float) -> list[around.LaneStretch]:
         """Lane sections within reach along the lane, both ways."""
 
-    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
-        """+1 where a lane is driven along s, -1 against it, shape (n,). [-]"""
-
-    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
-        """Lateral coordinate t on the road of places so far from their lanes' centres, shape (n,). [m]"""
+    def across(
+        self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.integer]]:
+        """Lateral coordinate t on the road of places so far from their lanes' centres [m], and +1 where the lane is
+        driven along s, -1 against it, shape (n,) each.
+        """
 
     def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
         """The same of one lane's centre, shape (n,). [m]"""
@@ -58,13 +59,12 @@ class OpenDriveRoads:
         """See `Roads`."""
         return around.lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
 
-    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
+    def across(
+        self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray
+    ) -> tuple[FloatArray, NDArray[np.integer]]:
         """See `Roads`."""
-        return np.asarray(self.network.travel_directions(road, lane), dtype=np.int64)
-
-    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
-        """See `Roads`."""
-        return self.network.offset_to_t(road, lane, s, offset)
+        profile = self.network.lane_profile(road, lane, s)
+        return profile.centre + profile.direction * offset, profile.direction
 
     def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
         """See `Roads`."""
@@ -108,26 +108,35 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     on = np.flatnonzero(there)
     where = (places.road[on], places.lane[on], places.s[on])
     road = {name: spread_out(values, there) for name, values in roads.columns(*where).items()}
-    direction, t = np.ones(n, dtype=np.int64), spread_out(roads.across(*where, offset[on]), there)
-    direction[on] = roads.directions(*where[:2])
+    direction, t = np.ones(n, dtype=np.int64), np.full(n, np.nan)
+    t[on], direction[on] = roads.across(*where, offset[on])
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
-    nearby = around.NearestVehicles.with_no_one(n)
-    for path, u, i, j in _along_paths(roads, places, on):
-        seen = around.see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
-        extents = (around.Extent(places.length[k], places.center_x[k]) for k in (i, j))
-        nearby.add(i, seen, around.free_space(seen, *extents), width[i], places.width[j], is_truck[j])
+    nearby, (u, i, j, paths) = around.NearestVehicles.with_no_one(n), _along_paths(roads, places, on)
+    seen = around.OtherVehicles(np.full(len(i), np.nan), np.full(len(i), np.nan), np.zeros(len(i), dtype=np.bool_))
+    for path, part in paths:
+        found = around.see_along(
+            path, u[i[part]], offset[i[part]], places.road, places.s, t, direction, roads.centre, j[part]
+        )
+        for values, theirs in zip(seen, found, strict=True):
+            values[part] = theirs
+    gap = around.free_space(seen, *(around.Extent(places.length[k], places.center_x[k]) for k in (i, j)))
+    k = np.flatnonzero(gap <= around.SIGHT_DISTANCE)  # most are not: in a straight line one looks further
+    seen = around.OtherVehicles(seen.ahead[k], seen.left[k], seen.oncoming[k])
+    nearby.add(i[k], seen, gap[k], width[i[k]], places.width[j[k]], is_truck[j[k]])
     lanes = {side: is_there.astype(np.float64) for side, is_there in lanes_beside(road).items()}
     return road | nearby.columns(lanes, always_fade=True)
 
 
 def _along_paths(
     roads: Roads, places: Places, on: IntArray
-) -> Iterator[tuple[list[around.LaneStretch], FloatArray, IntArray, IntArray]]:
-    """For every lane path: the path, where everybody on it is along it [m], and pairs of one on it and one in sight."""
+) -> tuple[FloatArray, IntArray, IntArray, list[tuple[list[around.LaneStretch], slice]]]:
+    """Where everybody is along the own lane path [m], pairs of one and another in sight, and of every lane path which
+    pairs look along it.
+    """
     u, group = np.zeros(len(places.x)), np.full(len(places.x), -1)
     origins: dict[tuple[int, int, float], tuple[int, float, list[around.LaneStretch]]] = {}
-    for k in on.tolist():
-        road, lane, s = int(places.road[k]), int(places.lane[k]), float(places.s[k])
+    where = (column[on].tolist() for column in (places.road, places.lane, places.s))
+    for k, road, lane, s in zip(on.tolist(), *where, strict=True):
         key = (road, lane, roads.section(road, lane, s))
         if key not in origins:
             origins[key] = (len(origins), s, roads.path(road, lane, s))
@@ -140,10 +149,8 @@ def _along_paths(
     order = np.argsort(group[vehicle], kind="stable")
     vehicle, other = vehicle[order], other[order]
     ends = np.searchsorted(group[vehicle], np.arange(len(origins) + 1))
-    for number, (_, _, path) in enumerate(origins.values()):
-        pairs = slice(ends[number], ends[number + 1])
-        if pairs.start < pairs.stop:
-            yield path, u, vehicle[pairs], other[pairs]
+    parts = zip(ends[:-1].tolist(), ends[1:].tolist(), origins.values(), strict=True)
+    return u, vehicle, other, [(path, slice(first, end)) for first, end, (_, _, path) in parts if first < end]
 
 
 def give_way_now(

@@ -159,14 +159,11 @@ class SumoRoads:
                 way += length
         return path
 
-    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
-        """See `Roads`: every lane is driven along its own direction."""
-        return np.ones(len(road), dtype=np.int64)
-
-    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
-        """See `Roads`: from the edge's right border."""
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> tuple[FloatArray, IntArray]:
+        """See `Roads`: from the edge's right border; every lane is driven along its own direction."""
         places = zip(road.tolist(), lane.tolist(), strict=True)
-        return np.array([self._middle[place] for place in places], dtype=np.float64) + offset
+        middle = np.array([self._middle[place] for place in places], dtype=np.float64)
+        return middle + offset, np.ones(len(road), dtype=np.int64)
 
     def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
         """See `Roads`."""

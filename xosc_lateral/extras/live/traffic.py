@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -108,7 +109,7 @@ class Traffic:
         _check(time, self._time, moment)
         context = self._context(moment) if self.is_due(time) else None
         there = np.flatnonzero(moment.driven)
-        drivers = self._present([moment.names[k] for k in there])
+        drivers = self._present(list(compress(moment.names, moment.driven.tolist())))
         passed = 0.0 if self._time is None else time - self._time
         is_first, is_restart = self._columns is None, self._time is None
         self._time = time
@@ -120,6 +121,8 @@ class Traffic:
         self._state["clock"][drivers] += passed * pace / self._step
         if context is not None:
             self._advance(time, moment, context, there, drivers)
+        else:  # one driver's numbers at a time, while there is nothing else to do
+            any(group.draw_ahead() for group, _ in self._groups.values())
         self._turn_over(drivers)
         rate, heading = np.zeros((2, len(moment.names)))
         moves = Moves(moment.offset.copy(), rate, heading, np.zeros(len(moment.names), dtype=np.bool_))
@@ -178,11 +181,12 @@ class Traffic:
         """What everybody sees, checked before anything changes."""
         columns: dict[str, FloatArray] = {"speed": moment.speed, "is_truck": moment.is_truck.astype(np.float64)}
         columns["acceleration"] = np.zeros(len(moment.names))
-        for row, name in enumerate(moment.names):
-            k = self._index.get(name)
-            if k is not None and self._state["begun"][k]:
-                change = moment.speed[row] - self._state["speeds"][k, 0]
-                columns["acceleration"][row] = change / SPEEDS_REMEMBERED / self._step
+        pairs = [(row, k) for row, name in enumerate(moment.names) if (k := self._index.get(name)) is not None]
+        rows, drivers = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        change = moment.speed[rows] - self._state["speeds"][drivers, 0]
+        columns["acceleration"][rows] = np.where(
+            self._state["begun"][drivers], change / SPEEDS_REMEMBERED / self._step, 0.0
+        )
         if moment.places is not None and self._roads is not None:
             columns |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
         columns |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
@@ -213,9 +217,9 @@ class Traffic:
                 self._groups[key] = (OffsetGroup(profile, self._columns), [])
             group, members = self._groups[key]
             known = set(members)
-            new = [name for name in names if name not in known]
-            group.add([self.seed_of(name) for name in new])
-            members += new
+            if new := [name for name in names if name not in known]:
+                group.add([self.seed_of(name) for name in new])
+                members += new
             rows, drivers = np.array([row[name] for name in members]), [self._index[name] for name in members]
             other_hand = profile.left_hand != self._left_hand
             seen = mirrored_context(context) if other_hand else context

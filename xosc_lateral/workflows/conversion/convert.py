@@ -134,10 +134,10 @@ def convert_scenario(
                 guard_input(Path(named))
         prepared = prepare(source, settings)
         plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
-        return carry_out(plan)
+        return conversion_of(plan, carried_out(plan))
 
 
-def carry_out(plan: Plan) -> Conversion:
+def carried_out(plan: Plan) -> Written:
     """Sample, write, check."""
     sampled = sample(plan)
     vehicles = plan.written_as(frozenset(entity.name for entity in sampled.entities if entity.is_enriched))
@@ -147,7 +147,7 @@ def carry_out(plan: Plan) -> Conversion:
         checked = _as_far_as_equivalent(plan, sampled, vehicles)
     if plan.saves and not plan.is_replay:  # a replay can be larger than memory: `write` put it in its place
         write_atomically(plan.output, checked.file.data)
-    return _conversion(plan, checked)
+    return checked
 
 
 CORRIDOR_NOTE = "jam corridor: assumed; no recording that we have shows how far drivers keep aside"
@@ -195,8 +195,9 @@ Look = tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]
 
 def _look_at_replay(written: Written) -> Written:
     """A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made."""
-    made = (one for one in written.movement.entities if one.is_enriched)
-    findings = (worst_of(compare_parts(one.motion, one.trajectory)) for one in made)
+    findings = (
+        worst_of(compare_parts(one.motion, one.trajectory)) for one in written.movement.entities if one.is_enriched
+    )
     return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in findings for one in some))
 
 
@@ -241,12 +242,13 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
         )  # fmt: skip
     stays = (line for name in names for line in phases(name, kept.ways.get(name))[1])
     return replace(
-        best, movement=movement, shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
+        best, movement=movement, played=replace(plan.played, scenario=output, motion=run),
+        shifts=kept.shifts, warnings=tuple(warned), trial_contacts=kept.trial_contacts,
         stays=(*in_words(best.paths, plan.played.motion), *stays),
     )  # fmt: skip
 
 
-def _conversion(plan: Plan, written: Written) -> Conversion:
+def conversion_of(plan: Plan, written: Written) -> Conversion:
     """What came of it, with all that a user has to know of it."""
     movement, file = written.movement, written.file
     wants_lifelike = plan.settings.lane_changes is LaneChanges.LIFELIKE

@@ -15,6 +15,7 @@ from xosc_lateral.files.openscenario.write.fit import write_converted
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.files.remote import leads_from
 from xosc_lateral.workflows.conversion.across import Way
+from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.phases import paths_of
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs
 from xosc_lateral.workflows.conversion.result import ConversionProvenance, Enriched, EventShift, LaneChanges
@@ -34,6 +35,7 @@ class Written:
     shifts: tuple[EventShift, ...] = ()
     warnings: tuple[Note, ...] = ()  # of the check
     trial_contacts: tuple[str, ...] = ()  # as `ConvertedScenario` has them
+    played: Played | None = None  # nominally, of a reactive output that was checked
     stays: tuple[str, ...] = ()  # lane changes of these paths' entities that stay as written, a line each
 
     @property

@@ -12,7 +12,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign, cos, hypot, inf, sin
+from math import copysign, cos, hypot, inf, nan, sin
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -78,12 +78,9 @@ def straight_distance(state: EntityState, x: float, y: float) -> float:
 
 
 def spot_of(state: EntityState) -> Spot:
-    """Where an entity is."""
+    """Where an entity is along the roads; x and y, which nobody needs then, are NaN."""
     state.locate()
-    pose = state.pose
-    if state.road == NO_ROAD:
-        return Spot(pose.x, pose.y)
-    return Spot(pose.x, pose.y, state.road, state.lane, state.s, state.t)
+    return Spot(nan, nan, state.road, state.lane, state.s, nan if state.road == NO_ROAD else state.t)
 
 
 def road_gap(state: EntityState, spot: Spot, *, limit: float = UNREACHABLE_DISTANCE) -> RoadGap | None:

@@ -90,27 +90,29 @@ def see_along(
     t: FloatArray,
     direction: NDArray[np.integer],
     centre_t: Callable[[int, int, FloatArray], FloatArray],
+    whom: IntArray | slice = slice(None),
 ) -> OtherVehicles:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
 
     From where one is on the path (`lane_path`) and from its lane's centre, positive left [m]; where the other is, road,
     s and t [m], and which way it drives along s, +1 or -1, 0 on no lane; and t of a lane's centre, by road, lane and s.
-    Others elsewhere are not seen (NaN).
+    `whom`: index of the row's other, shape (n,), where others are looked at from several places. Others elsewhere are
+    not seen (NaN).
     """
     n = len(own_u)
     seen = OtherVehicles(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     for part in path:
         on = (direction != 0) & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
-        k = np.flatnonzero(on)
-        if not len(k):
+        if not on.any():
             continue
-        ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[k]
+        u, left = np.full((2, len(s)), np.nan)
+        u[on] = part.at + part.sign * (s[on] - part.s_entry)
+        left[on] = part.sign * (t[on] - centre_t(part.road, part.lane, s[on]))
+        ahead = u[whom] - own_u
         # the own lane path may pass a place twice (a ring road): the nearer view counts
-        nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
-        k, ahead = k[nearer], ahead[nearer]
-        seen.ahead[k] = ahead
-        seen.left[k] = part.sign * (t[k] - centre_t(part.road, part.lane, s[k])) - own_offset[k]
-        seen.oncoming[k] = direction[k] != part.sign
+        k = np.flatnonzero(on[whom] & ~(np.abs(seen.ahead) <= np.abs(ahead)))
+        seen.ahead[k], seen.left[k] = ahead[k], left[whom][k] - own_offset[k]
+        seen.oncoming[k] = direction[whom][k] != part.sign
     return seen
 
 

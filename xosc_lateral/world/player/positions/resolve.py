@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from math import cos, nan, pi, sin
+from typing import Any
 
 import numpy as np
 
@@ -63,18 +65,21 @@ def pose_of(position: positions.Position, simulation: Simulation) -> Pose:
 
 def poses_of(places: Sequence[positions.Position], simulation: Simulation) -> list[Pose]:
     """World poses of many positions now; a path beside one entity is found on one way along the road."""
-    beside = list[positions.RelativeRoadPosition]()
-    for place in places:
-        if not isinstance(place, positions.RelativeRoadPosition) or place.orientation is not None:
-            break
-        if beside and place.entity_ref != beside[0].entity_ref:
-            break
-        beside.append(place)
-    poses = _poses_beside(beside, simulation) if beside else []
-    return poses + [pose_of(place, simulation) for place in places[len(beside) :]]
+    poses = list[Pose]()
+    for entity, run in groupby(
+        places,
+        lambda place: (
+            place.entity_ref
+            if isinstance(place, positions.RelativeRoadPosition) and place.orientation is None
+            else None
+        ),
+    ):
+        these = [*run]
+        poses += [pose_of(one, simulation) for one in these] if entity is None else _poses_beside(these, simulation)
+    return poses
 
 
-def _poses_beside(places: Sequence[positions.RelativeRoadPosition], simulation: Simulation) -> list[Pose]:
+def _poses_beside(places: Sequence[Any], simulation: Simulation) -> list[Pose]:
     """As `relative_road_position` has each."""
     state, network, driven = entity_on_road(places[0], simulation), simulation.network, 0.0
     scout = EntityState(state.entity, network, route=state.route)
