@@ -20,7 +20,7 @@ from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
 from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED
 from xosc_lateral.drivers.drives.evidence import of_clock
-from xosc_lateral.drivers.drives.identity import apart_in_time, identify
+from xosc_lateral.drivers.drives.identity import LONGEST_GAP, identify
 from xosc_lateral.extras.recordings import evidence
 from xosc_lateral.extras.recordings.cuts import MOVING_SPEED, require_headings
 from xosc_lateral.files.columns import (
@@ -135,6 +135,19 @@ USUAL_SPEEDS = 5.0, 60.0  # of moving traffic in the median, towns to motorways 
 MAX_SPEED_RATIO = 1.39  # a speed off by more is in another unit: root of the nearest, knots, 1.94 times as many [-]
 LEAST_FRAME_RATE, FRAME_RATE_AGREED = 5, 0.1  # slower, and 3.6, 3.28 or 2.24, are units of speed [1/s], [-]
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
+
+
+def apart_in_time(time: FloatArray, recording: IntArray, step: float) -> FloatArray:
+    """Times at which nobody of one recording meets somebody of another, shape (n,). [s]"""
+    if not recording.any():
+        return time
+    clock, at = np.empty(len(time)), 0.0
+    for number in np.unique(recording):
+        mine = recording == number
+        begin = float(time[mine].min())
+        clock[mine] = time[mine] - begin + at
+        at = step * np.ceil((float(clock[mine].max()) + 10.0 * LONGEST_GAP) / step)
+    return clock
 
 
 def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
