@@ -19,7 +19,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.vehicle_classes import ON_ROADS, TRUCKS, class_named
@@ -28,6 +28,7 @@ from xosc_lateral.extras.recordings import sumo
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS, is_right_to_left
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of_rows
+from xosc_lateral.extras.recordings.importers.tracks import lanes_beside
 from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.neighbours import neighbour_columns
 from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane
@@ -58,11 +59,12 @@ def import_fcd(
     width = lane_width or shown_width(tracks, rows["posLat"].to_numpy())
     lanes = _net_of(rows, width) if known is None else known
     left_hand = _left_hand(tracks, rows, lanes, None if known is None else known.left_hand, source)
-    turned = "left-hand traffic: lanes and sides are counted from the left kerb, and turned"
-    notes = [*tracks.notes, *([turned] if left_hand else [])]
+    turned = ["left-hand traffic: lanes and sides are counted from the left kerb, and turned"]
+    notes = [*tracks.notes, *turned * left_hand]
     if known is None:
-        shown = "" if lane_width else f", {width:.4g} m are taken"
-        notes.append(f"without --net: lanes without a width{shown}, and nobody is seen on another edge")
+        notes.append(
+            f"without --net: lanes without a width, {width:.4g} m are taken, and nobody is seen on another edge"
+        )
     elif len(strange := rows["lane"][~rows["lane"].isin(list(known.lanes))]):
         raise FormatError(f"lane {strange.iloc[0]!r} is not in {net}", path=source)
     return imported(
@@ -120,15 +122,11 @@ def shown_width(tracks: Tracks, side: FloatArray) -> float:
 
 def _drive_table(tracks: Tracks, rows: pd.DataFrame, net: sumo.SumoNet, left_hand: bool) -> pd.DataFrame:
     side = rows["posLat"].to_numpy()
-    # lanes of an edge lie side by side, counted from the right here
-    numbers, following = _driving_lanes(net)
-    edges: dict[str, list[int]] = {}
-    for name in sorted(numbers, key=lambda name: net.lanes[name].index, reverse=left_hand):
-        edges.setdefault(net.lanes[name].edge, []).append(numbers[name])
-    left, index, count = (np.full(len(numbers), value) for value in (-1, 0, 1))
-    for lanes in edges.values():
-        index[lanes], count[lanes], left[lanes] = np.arange(len(lanes)), len(lanes), [*lanes[1:], -1]
-    graph = LaneGraph(np.array([net.lanes[name].length for name in numbers]), left, following)
+    numbers, left, following = _driving_lanes(net, left_hand)
+    graph, (index, count) = (
+        LaneGraph(np.array([net.lanes[name].length for name in numbers]), left, following),
+        lanes_beside(left),
+    )
     piece = np.array([numbers.get(name, -1) for name in rows["lane"]])
     is_truck = np.isin(tracks.kind, list(TRUCKS))
     near = neighbour_columns(
@@ -144,10 +142,14 @@ def _drive_table(tracks: Tracks, rows: pd.DataFrame, net: sumo.SumoNet, left_han
     })  # fmt: skip
 
 
-def _driving_lanes(net: sumo.SumoNet) -> tuple[dict[str, int], list[list[int]]]:
-    """Numbers of the lanes that vehicles drive on, and those that each leads to."""
+def _driving_lanes(net: sumo.SumoNet, left_hand: bool) -> tuple[dict[str, int], IntArray, list[list[int]]]:
+    """Numbers of the lanes that vehicles drive on, which is on the left of each (-1: none), and those that each leads
+    to: lanes of an edge lie side by side, counted from the kerb."""
     numbers = {name: k for k, name in enumerate(name for name, lane in net.lanes.items() if lane.is_driving)}
-    return numbers, [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
+    lanes, side = [net.lanes[name] for name in numbers], -1 if left_hand else 1
+    left = np.array([numbers.get(f"{lane.edge}_{lane.index + side}", -1) for lane in lanes], dtype=np.int64)
+    following = [[numbers[other] for other in net.following.get(name, ()) if other in numbers] for name in numbers]
+    return numbers, left, following
 
 
 def _net_of(rows: pd.DataFrame, width: float) -> sumo.SumoNet:
@@ -177,11 +179,11 @@ def _left_hand(tracks: Tracks, rows: pd.DataFrame, net: sumo.SumoNet, stated: bo
 # ---- for `reconstruct`: the lanes of a network as lines, and where vehicles' rear axles were -------------------------
 def lanes_of_net(net: sumo.SumoNet, path: Path) -> list[DrivenLane]:
     """Lanes that vehicles drive on, those inside junctions included. Raises `FormatError`: a lane without a shape."""
-    numbers, following = _driving_lanes(net)
+    numbers, beside, following = _driving_lanes(net, net.left_hand)
     if not numbers:
         raise FormatError("no lane for vehicles", path=path)
     lanes = list[DrivenLane]()
-    for name, onward in zip(numbers, following, strict=True):
+    for name, on_left, onward in zip(numbers, beside.tolist(), following, strict=True):
         lane = net.lanes[name]
         try:
             points = np.array([point.split(",")[:2] for point in lane.shape.split()], dtype=np.float64)
@@ -196,8 +198,7 @@ def lanes_of_net(net: sumo.SumoNet, path: Path) -> list[DrivenLane]:
         normal = np.concatenate([normals[:1], normals[:-1] + normals[1:], normals[-1:]])
         normal[1:-1] /= 1.0 + (normals[:-1] * normals[1:]).sum(axis=1, keepdims=True)  # as far from both pieces
         half = 0.5 * lane.width * normal
-        on_left = f"{lane.edge}_{lane.index + (-1 if net.left_hand else 1)}"  # lanes count from the kerb
-        lanes.append(DrivenLane(points + half, points - half, numbers.get(on_left, -1), onward))
+        lanes.append(DrivenLane(points + half, points - half, on_left, onward))
     return lanes
 
 

@@ -95,7 +95,7 @@ class Tracks:
     heading: FloatArray
     speed: FloatArray
     length: FloatArray
-    kind: NDArray[np.str_]
+    kind: NDArray[Any]  # words
     width: FloatArray | None = None
     is_reference: bool = False  # positions are those of the reference point, as `play` writes them, not of the middle
     rear: FloatArray | None = None  # how far x and y lie behind the vehicle's middle; None: they are the middle [m]
@@ -187,7 +187,8 @@ def tracks_of(table: pd.DataFrame, path: Path, saved: TableMapping, *, is_log: b
     if "vehicle_class" in rows:
         number, words = rows.pop("vehicle_class").factorize()
         kind, usual = (
-            np.array(each)[number] for each in (list(words), [USUAL_LENGTH.get(word, 4.6) for word in words])
+            np.array(each, dtype=of)[number]  # words as objects: eight bytes a row, however long they are
+            for each, of in ((list(words), object), ([USUAL_LENGTH.get(word, 4.6) for word in words], None))
         )
     more: dict[str, Any] = {name: rows.pop(name).to_numpy() for name in list(rows.columns)}
     velocity = more.pop("vx", None), more.pop("vy", None)  # along which axes, only their hypotenuse does not ask
