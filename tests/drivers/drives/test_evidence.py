@@ -35,7 +35,8 @@ def test_lane_changes_prove_side_and_unit(turned: float, factor: float, words: s
 
 
 @pytest.mark.parametrize(("factor", "words"), [
-    (1.1, None), (0.9, None), (1.4, "lane_width=COLUMN:0.714 m"), (0.7, "lane_width=COLUMN:1.43 m"),
+    (1.1, None), (0.9, None), (100.0, None), (1.0 / 0.3048, None),  # units are said elsewhere
+    (1.4, "lane_width=COLUMN:0.714 m"), (0.7, "lane_width=COLUMN:1.43 m"),
 ])  # fmt: skip
 def test_lane_changes_prove_the_width_of_lanes_at_any_rate(factor: float, words: str | None) -> None:
     for step in (0.04, 0.1, 0.4):  # in the last, vehicles pass half a metre from row to row

@@ -93,7 +93,7 @@ def of_lane_changes(changes: FloatArray, farthest: float) -> str | None:
     count = int(fits[unit].sum())
     if count < least:
         alike = int((np.abs(np.log(np.abs(jumps) / widths / ratio)) < SIZE_AGREED).sum())
-        if alike < least or abs(np.log(ratio)) < SIZE_AGREED:
+        if alike < least or not SIZE_AGREED <= abs(np.log(ratio)) < 1.0:  # units are farther apart: the column's own
             return None
         what = f"{alike} lane changes move it by {ratio * width:.3g}, and lanes are {width:.3g} m wide"
         wheels = f", or, of distances, wheel_track = {(ratio - 1.0) * width:.2g}" if ratio > 1.0 else ""

@@ -278,7 +278,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
-    if not recording.is_highd:
+    if recording.layout != "highD":
         return _on_road(levelx.tracks_in(recording), files[0], road)
     made, tracks, _ = levelx.on_its_road(recording)
     return _made(made, tracks, files[0])

@@ -80,23 +80,22 @@ def import_levelx(
     if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
     network = None if road is None else read_opendrive(road)
-    parts, layouts, steps, dropped, notes = [], set[str](), set[float](), Counter[str](), list[str]()
+    parts, layouts, dropped, notes = [], set[tuple[str, float]](), Counter[str](), list[str]()
     for path in files:
         recording = Recording.read(path)
-        layout = "highD" if recording.is_highd else "exiD" if recording.is_exid else "inD"
         placed, beside, more = _placed(recording, network)
         notes += [*placed.notes(), *(mostly_beside(placed) if network is not None else [])]
         table = drive_table(placed, beside, settings).assign(**more)
-        parts.append(table.assign(drive=f"{layout.lower()}-{recording.number}-" + table["drive"]))
+        parts.append(table.assign(drive=f"{recording.layout.lower()}-{recording.number}-" + table["drive"]))
         dropped += Counter(placed.tracks.dropped)
-        layouts.add(layout)
-        steps.add(1.0 / recording.frame_rate)
-    if len(layouts) > 1 or len(steps) > 1:
+        layouts.add((recording.layout, 1.0 / recording.frame_rate))
+    if len(layouts) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
-    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings), "dropped": dropped}
-    sources = files if road is None else [*files, Path(road)]
-    table = pd.concat(parts, ignore_index=True)
-    return imported(table, sources=sources, step=steps.pop(), notes=tuple(notes), **about)
+    layout, step = layouts.pop()
+    return imported(
+        pd.concat(parts, ignore_index=True), sources=files if road is None else [*files, Path(road)], step=step,
+        notes=tuple(notes), format=f"levelx {layout}", licence=LICENCE, settings=asdict(settings), dropped=dropped,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +128,10 @@ class Recording:
         return self.path.name.split("_")[0]
 
     @property
-    def is_highd(self) -> bool:
-        """Else its vehicles have middles."""
-        return "xCenter" not in self.tracks.columns
-
-    @property
-    def is_exid(self) -> bool:
-        """Whether rows say where in their lane they are."""
-        return "latLaneCenterOffset" in self.tracks.columns
+    def layout(self) -> str:
+        """Of highD; of exiD, whose rows say where in their lane they are; or of inD, rounD and uniD ("inD")."""
+        named = self.tracks.columns
+        return "highD" if "xCenter" not in named else "exiD" if "latLaneCenterOffset" in named else "inD"
 
     @property
     def frame_rate(self) -> float:
@@ -226,12 +221,12 @@ def _placed(
     recording: Recording, network: RoadNetwork | None
 ) -> tuple[PlacedTracks, LaneGraph | dict[str, FloatArray], dict[str, FloatArray]]:
     """A recording on a road, or in the lanes that its rows name; who is beside whom, and columns as recorded."""
-    if recording.is_highd:
+    if recording.layout == "highD":
         made, tracks, acceleration = on_its_road(recording)
         placed, graph = place_on_road(tracks, parse_opendrive(made.to_xml().encode(), made.name))
         placed.road = {name: placed.road[name] for name in ("lane_index", "lane_count")}
         return placed, graph, {"acceleration": acceleration}
-    if network is None and recording.is_exid:
+    if network is None and recording.layout == "exiD":
         return _in_named_lanes(recording)
     if network is None:
         raise FormatError("comes without lanes: give its road with --road FILE.xodr", path=recording.path)
