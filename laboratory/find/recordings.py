@@ -163,6 +163,8 @@ TABLE = ANY | {
     "lanes from the left": Bend(lambda rows, _: rows.assign(lane_index=1 - rows["lane_index"])),
     "half widths": Bend(scaled("lane_width", 0.5)),
     "twice the widths": Bend(scaled("lane_width", 2.0)),
+    "wider lanes": Bend(scaled("lane_width", 1.4), mend="lane_width:0.714 m"),
+    "narrower lanes": Bend(scaled("lane_width", 0.7), mend="lane_width:1.43 m"),
     "widths in ft": Bend(scaled("lane_width", 1 / 0.3048), mend="lane_width:ft"),
     "missing as -999": Bend(marked(-999.0)),
     "missing as -1": Bend(marked(-1.0)),
@@ -244,8 +246,7 @@ class Recordings:
 
     def look(self, spec: Spec, only: Finding | None = None) -> list[Finding]:
         bend = _bend(spec["layout"], spec["bend"])
-        public = LAYOUTS[spec["public"]] if spec["public"] else None
-        mends = {**(public.mend if public else {}), **bend.mends()}
+        mends = {**(LAYOUTS[spec["public"]].mend if spec["public"] else {}), **bend.mends()}
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             case, words = written(spec, folder)
@@ -257,8 +258,7 @@ class Recordings:
                     break
                 kept |= more
                 wrong, text = read(spec, case, mapped(words, spec, folder, kept), bend, folder)
-            told = spec["bend"] in UNBENT or bend.mend
-            if wrong is None and told:
+            if wrong is None and (spec["bend"] in UNBENT or bend.mend):
                 kind = "refused, and nothing is wrong" if not mends else "refused, the option is not named"
                 return [self._finding(spec, kind, text)]
             said = bool(wrong) and any(word in text for word in ("warning:", "may be", "note: "))

@@ -131,7 +131,9 @@ FORMS = {
     "frame": pd.read_csv,
     "dict": lambda path: pd.read_csv(path).to_dict("list"),
     "Arrow": lambda path: pa.table(dict(pd.read_csv(path))),
-    "polars": lambda path: Foreign(pa.table(dict(pd.read_csv(path)))),
+    "lazy": lambda path: Foreign(pa.table(dict(pd.read_csv(path)))),
+    "polars": lambda path: pytest.importorskip("polars", reason="polars is not installed").read_csv(path),
+    "polars, lazy": lambda path: pytest.importorskip("polars", reason="polars is not installed").scan_csv(path),
     "Drive": lambda path: xl.read_drives(path)[0],
     "Drives": lambda path: xl.read_drives(path),
     "result": lambda path: xl.import_drives("table", path),
@@ -161,6 +163,8 @@ VERBS = {
     "fit": lambda drives, coarse: xl.fit(drives, model="two-level"),
     "plan_loop": lambda drives, coarse: xl.plan_loop(drives),
     "import": lambda drives, coarse: xl.import_drives("table", drives),
+    "close_loop": lambda drives, coarse: xl.close_loop(drives, coarse, seed=1),
+    "compare_profiles": lambda drives, coarse: xl.compare_profiles(coarse, xl.fit(drives, model="two-level")),
 }
 
 

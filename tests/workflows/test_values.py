@@ -15,6 +15,8 @@ import pytest
 import xosc_lateral as xl
 from tests.extras.recordings.test_reconstruct import ROAD
 from tests.kit.jam import jam
+from tests.kit.sumo_run import write_run
+from xosc_lateral.workflows.profiles.profiles import find_uses
 from xosc_lateral.workflows.result import Result
 
 
@@ -48,9 +50,21 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "import": lambda at: xl.import_drives("tracks", at / "rec.csv", road=at / "road.xodr"),
     "reconstruct": lambda at: xl.reconstruct(at / "rec.csv", road=at / "road.xodr"),
     "detect": lambda at: xl.detect(at / "drive.csv", detectors="lateral-speed"),
+    "sight": lambda at: xl.detect(at / "rec.csv", road=at / "road.xodr", sight=True),
+    "cut-ins": lambda at: xl.detect(at / "cut-in.xosc", like="motorway", count=2),
     "plan_loop": lambda at: xl.plan_loop(at / "drive.csv"),
+    "close_loop": lambda at: xl.close_loop(at / "drive.csv", seed=1),
+    "profile uses": lambda at: find_uses("motorway", RESULTS["convert_many"](at).folder),
     "dossier": lambda at: xl.dossier("motorway"),
+    "live run": lambda at: live(at),
 }
+
+
+def live(at: Path) -> Result:
+    """A run of SUMO, where it is installed."""
+    for module in ("libsumo", "sumo"):
+        pytest.importorskip(module, reason="the extra sumo is not installed")
+    return xl.live_sumo(write_run(at, end=5.0, cars=1800), seed=1)
 
 
 @pytest.mark.pages

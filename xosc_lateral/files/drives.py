@@ -161,7 +161,7 @@ def require_evidence(
     `named`: columns whose unit a mapping states, and "missing", if it states what stands for no value.
     """
     offset, width = position(columns)
-    wander, jumps = [np.zeros(0)], [(np.zeros(0),) * 3]
+    wander, jumps = [np.zeros(0)], [np.zeros((4, 0))]
     for name, rows in drives:
         mine = rows[np.isfinite(columns["time"][rows])]
         mine = mine[np.argsort(columns["time"][mine], kind="stable")]
@@ -192,8 +192,7 @@ def require_evidence(
     known = np.isfinite(offset + width)
     if known.any():
         farthest, median = float(np.quantile(np.abs(offset[known]), 0.999)), float(np.median(width[known]))
-        each = (np.concatenate(parts) for parts in zip(*jumps, strict=True))
-        wrong = evidence.of_lane_changes(next(each), next(each), next(each), median, farthest)
+        wrong = evidence.of_lane_changes(np.concatenate(jumps, axis=1), farthest)
         wrong = wrong or (None if "offset" in named else evidence.of_places(offset, width))
         if wrong:
             raise FormatError(wrong, path=path, element="column 'offset'")

@@ -34,9 +34,27 @@ def test_lane_changes_prove_side_and_unit(turned: float, factor: float, words: s
     assert says(time, offset, lane) is None if words is None else words in (says(time, offset, lane) or "")
 
 
-def says(time: np.ndarray, offset: np.ndarray, lane: np.ndarray | None) -> str | None:
-    jumps = evidence.jumps_of(time, offset, np.full(len(time), WIDTH), lane)
-    return evidence.of_lane_changes(*jumps, WIDTH, float(np.quantile(np.abs(offset), 0.999)))
+@pytest.mark.parametrize(("factor", "words"), [
+    (1.1, None), (0.9, None), (100.0, None), (1.0 / 0.3048, None),  # units are said elsewhere
+    (1.4, "lane_width=COLUMN:0.714 m"), (0.7, "lane_width=COLUMN:1.43 m"),
+])  # fmt: skip
+def test_lane_changes_prove_the_width_of_lanes_at_any_rate(factor: float, words: str | None) -> None:
+    for step in (0.04, 0.1, 0.4):  # in the last, vehicles pass half a metre from row to row
+        said = says(*changing(np.random.default_rng(1), step=step), factor * WIDTH)
+        assert said is None if words is None else words[:-4] in (said or "")
+
+
+def test_lanes_of_two_widths_contradict_nothing() -> None:
+    time, offset, lane = changing(np.random.default_rng(1))
+    rare = np.r_[np.full(len(time), 1.0), np.full(2 * len(time), 1.3)]  # those without lane changes are wider
+    offset, lane = (np.r_[each, np.full(2 * len(time), each[-1])] for each in (offset, lane))
+    jumps = evidence.jumps_of(0.1 * np.arange(len(rare)), offset, rare * WIDTH, lane)
+    assert len(jumps[0]) == 2 and evidence.of_lane_changes(jumps, 1.8) is None
+
+
+def says(time: np.ndarray, offset: np.ndarray, lane: np.ndarray | None, width: float = WIDTH) -> str | None:
+    jumps = evidence.jumps_of(time, offset, np.full(len(time), width), lane)
+    return evidence.of_lane_changes(jumps, float(np.quantile(np.abs(offset), 0.999)))
 
 
 @pytest.mark.parametrize(("origin", "sign", "options"), [

@@ -204,6 +204,7 @@ def test_fcd_output_is_fitted(run: Path) -> None:
     assert main(["import", "fcd", str(run / "fcd.xml"), "-o", str(run / "drives.parquet"), "-q"]) == 0
     drives = xl.read_drives(run / "drives.parquet")
     assert len(drives) > 8
+    assert all(np.abs(one.lane_width - 3.75).max() < 0.05 for one in drives), "as lane changes show it"
     assert all(np.isfinite(one.offset).all() for one in drives)
 
 
@@ -224,8 +225,12 @@ def test_what_is_no_good_is_said_in_a_line(run: Path, tmp_path: Path, capsys: py
         ("<fcd-export><timestep time='x'/></fcd-export>", "time='x'"),
         ("<fcd-export>", "not XML"),
         (
-            "<fcd-export><timestep time='0'><vehicle id='a' lane='e_x' pos='1' posLat='0' speed='2'/></timestep>"
-            "</fcd-export>",
+            "<fcd-export>"
+            + "".join(
+                f"<timestep time='{k}'><vehicle id='a' lane='e_x' pos='1' posLat='0' speed='2'/></timestep>"
+                for k in "01"
+            )
+            + "</fcd-export>",
             r"fcd\.xml: can't be imported: .*'x'",
         ),
     ):

@@ -84,6 +84,11 @@ def test_one_scenario(store, folder: Path) -> None:
     assert store.cat("/bucket/out/b.xosc") == b"<mine/>"
 
 
+def test_variations_of_a_scenario_that_lies_here(store, folder: Path) -> None:
+    made = xl.vary(folder / "db/cut-in.xosc", "memory://bucket/varied", like="motorway", count=1)
+    assert store.exists("/bucket/varied/cut-in.xosc") and made.distribution.name == "cut-in-like-motorway.xosc"
+
+
 def test_what_is_not_there(store) -> None:
     with pytest.raises(xl.FormatError, match=r"^nowhere://a.xosc: nowhere:// is not read"):
         xl.play("nowhere://a.xosc")

@@ -3,8 +3,9 @@
 Each question gives a line with the option that mends it, or None. What contradicts itself is refused by who asks; what
 only makes results worse is a note. Limits are where the two readings part, not how far real driving goes:
 
-- unit, side and origin of the offset: two lane changes that agree, within 15 % of a lane's width; of 130 motorway
-  vehicles with two, 128 are found when turned or written in feet, and none of 445 and 567 real ones is as it is;
+- unit, side and origin of the offset, and the lanes' width: two lane changes that agree, within 15 % of a lane's width;
+  of 130 motorway vehicles with two, 128 are found when turned or written in feet, 127 when lanes are 20 % wider or
+  narrower, and none of 445 and 567 real ones is as it is;
 - rows in turns: twice the change from row to row that there is over several; white noise gives 1;
 - clock: 1 kHz to one row in 2 s; minutes: sideways at 0.3 m/s in the median, where drivers keep lanes at 0.1;
 - shift of a map: two standard deviations of 445 real vehicles' mean offsets, 0.42 m, or half of it between the two
@@ -52,16 +53,14 @@ SURE_ERRORS = 2.0  # standard errors
 
 
 # ---- signs and units, by lane changes --------------------------------------------------------------------------------
-def jumps_of(
-    time: FloatArray, offset: FloatArray, width: FloatArray, lane: FloatArray | None
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Jumps of one drive's offset from one marking to the other, to the left above 0, shape (k,) [m]; their middles
-    [m]; and how many lanes `lane` steps to the left about then (NaN: none, or several times)."""
+def jumps_of(time: FloatArray, offset: FloatArray, width: FloatArray, lane: FloatArray | None) -> FloatArray:
+    """Jumps of one drive's offset from one marking to the other, to the left above 0 [m]; their middles [m]; how many
+    lanes `lane` steps to the left about then (NaN: none, or several times); lanes' width there [m]. Shape (4, k)."""
     good = np.isfinite(time + offset + width)
     time, offset, width = time[good], offset[good], width[good]
     jump, step, middle = np.diff(offset), np.diff(time), 0.5 * (offset[1:] + offset[:-1])
     if not len(jump):
-        return jump, jump, jump
+        return np.zeros((4, 0))
     least = np.maximum(FASTEST_ASIDE * step, BEYOND_NOISE * np.median(np.abs(jump)))
     leap = (np.abs(jump) > least) & (step <= JUMP_WINDOW)
     ends = np.abs(middle), np.abs(np.abs(middle) - 0.5 * np.abs(jump))  # from the middle, or from a marking
@@ -71,25 +70,35 @@ def jumps_of(
     steps = np.full(len(at), np.nan)
     if lane is not None and len(at):
         known = np.flatnonzero(np.isfinite(lane[good]))
-        moved = np.diff(lane[good][known])
-        when = time[known[1:]][moved != 0.0]
-        for k, row in enumerate(at.tolist()):
-            near = moved[moved != 0.0][np.abs(when - time[row]) <= JUMP_WINDOW]
-            steps[k] = near[0] if len(near) == 1 else np.nan
-    return jump[at], middle[at], steps
+        moved = np.r_[np.diff(lane[good][known]), np.nan]
+        there = np.flatnonzero(moved[:-1])
+        first, end = np.searchsorted(time[known[1:]][there], [time[at] - JUMP_WINDOW, time[at] + JUMP_WINDOW])
+        steps = np.where(end - first == 1, moved[np.r_[there, -1][first]], np.nan)
+    # less what it moves in a row, as before and after
+    drift = np.interp(at, np.flatnonzero(~leap), (jump / np.maximum(step, 1e-9))[~leap])
+    return np.stack([jump[at] - drift * step[at], middle[at], steps, 0.5 * (width[at] + width[at + 1])])
 
 
-def of_lane_changes(
-    jumps: FloatArray, middles: FloatArray, steps: FloatArray, width: float, farthest: float
-) -> str | None:
-    """What lane changes of all drives say of the offset's unit, side and where it counts from; `width` as believed,
-    `farthest`: the offset is hardly ever farther from 0. [m]"""
+def of_lane_changes(changes: FloatArray, farthest: float) -> str | None:
+    """What lane changes of all drives (`jumps_of`) say of the offset's unit, side and where it counts from, and of the
+    lanes' width; `farthest`: the offset is hardly ever farther from 0. [m]"""
+    jumps, middles, steps, widths = changes
+    least = max(LEAST_JUMPS, AGREED * len(jumps))
+    if len(jumps) < least:
+        return None
+    width, ratio = float(np.median(widths)), float(np.exp(np.median(np.log(np.abs(jumps) / widths))))
     sizes = {"m": width, "lane widths": 1.0, **{unit: width * by for unit, by in UNIT_SIZES.items()}}
     fits = {unit: np.abs(np.log(np.abs(jumps) / size)) < SIZE_AGREED for unit, size in sizes.items()}
     unit = max(fits, key=lambda name: int(fits[name].sum()))
     count = int(fits[unit].sum())
-    if count < max(LEAST_JUMPS, AGREED * len(jumps)):
-        return None
+    if count < least:
+        alike = int((np.abs(np.log(np.abs(jumps) / widths / ratio)) < SIZE_AGREED).sum())
+        if alike < least or not SIZE_AGREED <= abs(np.log(ratio)) < 1.0:  # units are farther apart: the column's own
+            return None
+        what = f"{alike} lane changes move it by {ratio * width:.3g}, and lanes are {width:.3g} m wide"
+        wheels = f", or, of distances, wheel_track = {(ratio - 1.0) * width:.2g}" if ratio > 1.0 else ""
+        options = f"lane_width=COLUMN:{ratio:.3g} m or offset=COLUMN:{1.0 / ratio:.3g} m{wheels}"
+        return f"{what}: one of both is wrong, {options}"
     side = (np.sign(jumps) * np.sign(steps))[fits[unit] & np.isfinite(steps)]
     wrong = int((side > 0.0).sum())  # to the left, by a lane more from the right, the offset jumps to the right
     aside = middles[fits[unit]] / sizes[unit]

@@ -194,16 +194,3 @@ def _goes_on(time: FloatArray, x: FloatArray, y: FloatArray, before: IntArray, a
     """Whether one stretch is where the other's speed leads."""
     both = np.r_[before[-6:], after[:6]]
     return not leaps(time[both], x[both], y[both])[len(before[-6:]) - 1]
-
-
-def apart_in_time(time: FloatArray, recording: IntArray, step: float) -> FloatArray:
-    """Times at which nobody of one recording meets somebody of another, shape (n,). [s]"""
-    if not recording.any():
-        return time
-    clock, at = np.empty(len(time)), 0.0
-    for number in np.unique(recording):
-        mine = recording == number
-        begin = float(time[mine].min())
-        clock[mine] = time[mine] - begin + at
-        at = step * np.ceil((float(clock[mine].max()) + 10.0 * LONGEST_GAP) / step)
-    return clock

@@ -73,6 +73,7 @@ def vary(
     """
     from xosc_lateral.base.errors import DriverProfileError, FormatError
     from xosc_lateral.files.atomic import together, write_atomically
+    from xosc_lateral.files.openscenario.read import RoadSearch
     from xosc_lateral.files.openscenario.write import build
     from xosc_lateral.files.openscenario.write.draft import Draft
     from xosc_lateral.files.openscenario.write.fit import rewrite_paths
@@ -102,12 +103,12 @@ def vary(
     with together():
         for place, text in texts.items():
             write_atomically(place, text.rstrip() + "\n" + template_mark(text))
-    allowed = (*as_paths(allow), *(one.parent for one in played.scenario.input_files))
     roads = () if played.scenario.road_file is None else (played.scenario.road_file.parent,)
     some = sorted({k for one in drawn.changes for k in np.argsort(one.durations)[[0, count // 2, -1]].tolist()})
     after = [
         play_scenario(varied, parameters={name: f"{rows[k]:.3f}" for name, rows in values.items()},
-                      allowed=(*allowed, *roads))
+                      allowed=(*as_paths(allow), *(one.parent for one in played.scenario.input_files), *roads),
+                      roads=RoadSearch(folders=roads))  # what is written elsewhere has none beside it
         for k in some
     ]  # fmt: skip
     return Variations(varied, sets, drawn.changes, drawn.speed_changes, _closest([played]), _closest(after))

@@ -253,10 +253,11 @@ class ClosedLoop(Result):
         return record | {"messages": self.message_records()}
 
     def plot(self) -> Figure:
-        """Residual by context, before and after."""
-        from xosc_lateral.extras.loop.loop_figures import residual_figure
+        """Residual by context, before and after; of drives without context, spectra."""
+        from xosc_lateral.extras.loop.loop_figures import residual_figure, spectrum_figure
 
-        return residual_figure(self._result, "mean")
+        residual = residual_figure(self._result, "mean")
+        return residual if residual.panels else spectrum_figure(self._result)
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""

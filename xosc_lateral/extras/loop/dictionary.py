@@ -280,7 +280,7 @@ class Search:
     quantities: Quantities
     seed: np.random.SeedSequence
     levels: Mapping[str, float]  # Family-wise p-value up to which the best of each component counts as found.
-    progress: Callable[[str], None]  # Gets what is being done, in a few words.
+    progress: Callable[[str], object]  # Gets what is being done, in a few words.
     # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
     # p-values, and components that have none are not tested. None: this is the table.
     wanted: Mapping[str, int] | None = None

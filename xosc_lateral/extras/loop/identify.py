@@ -98,14 +98,14 @@ def identify(
         usable, search = search_of(coarse, seed, excluded, roles, lambda what: progress(0.1, what))
         selection = name_time_beside(search, select(search, initial))
         if not selection.accepted:
-            return Identified(usable, selection, search)
+            return Identified(usable, selection, replace(search, progress=str))  # a value: nobody is told any more
         accepted = [one.term for one in selection.accepted]
 
         def finished(share: float) -> None:
             progress(0.3 + 0.3 * share, "selecting without a fold")
 
         nested = nest(search, initial, accepted, finished)
-        return _worst_first(Identified(usable, selection, search, nested))
+        return _worst_first(Identified(usable, selection, replace(search, progress=str), nested))
 
 
 def search_of(

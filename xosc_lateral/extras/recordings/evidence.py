@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.rows import BLOCK
 from xosc_lateral.drivers.drives.evidence import UNIT_SIZES, noisy
 
 USUAL_WIDTH = 1.8  # [m]
@@ -52,10 +53,12 @@ def overlaps(
     from scipy.spatial import cKDTree
 
     good = np.flatnonzero(np.isfinite(time + x + y + heading))
-    instant = np.round((time[good] - time[good].min()) / step) if len(good) else np.zeros(0)
-    apart = 1e3
-    tree = cKDTree(np.column_stack([x[good] - x[good].mean(), y[good] - y[good].mean(), instant * apart]))
-    first, second = good[tree.query_pairs(8.0, output_type="ndarray")].T if len(good) else (good, good)
+    good = good[np.argsort(time[good], kind="stable")]
+    instant, near = np.round((time[good] - time.min()) / step), [np.zeros((0, 2), dtype=np.intp)]
+    for part in np.split(np.arange(len(good)), np.searchsorted(instant, instant[BLOCK::BLOCK])):  # instants are whole
+        places = np.column_stack([x[good[part]], y[good[part]], 1e3 * instant[part]])
+        near.append(good[part[cKDTree(places - places[:1]).query_pairs(8.0, output_type="ndarray")]])
+    first, second = np.concatenate(near).T
     other = vehicle[first] != vehicle[second]
     first, second = first[other], second[other]
     over = np.zeros(len(first), dtype=np.bool_)

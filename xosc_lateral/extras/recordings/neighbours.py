@@ -29,12 +29,12 @@ def neighbour_columns(
     `step`: usual from row to row. [s] `scale`: metres along the lane per metre of `middle`. [-]
     """
     inside, piece = piece >= 0, np.maximum(piece, 0)
-    part, station, rank, own_scale = graph.stations(piece, middle)
+    part, middle, rank, own_scale = graph.stations(piece, middle)
     scale = own_scale * scale
     rank = np.where(inside, rank - int(rank.min()), -1)
-    line = np.where(inside, part, -1)
-    row_of, instant, moved, place = at_instants(station, line, speed / scale, time, vehicle, step)
-    del station, line, inside
+    row_of, instant, middle, place = at_instants(
+        middle, np.where(inside, part, -1), speed / scale, time, vehicle, step
+    )  # fmt: skip
     on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
     on_right[graph.left[on_left]] = True
     columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
@@ -45,12 +45,12 @@ def neighbour_columns(
         rows = by_time[begin:end]
         row, begin = row_of[rows], end
         near = find_neighbours(
-            instant[rows] * parts + part[row], rank[row], moved[rows], length[row], is_truck[row],
+            instant[rows] * parts + part[row], rank[row], middle[rows], length[row], is_truck[row],
             lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
         )  # fmt: skip
         for name, values in near.items():
             columns.setdefault(name, np.empty(n))[rows] = values
-    del row_of, instant, moved, by_time
+    del row_of, instant, middle, by_time
     return {name: columns.pop(name)[place] for name in list(columns)}
 
 
@@ -143,10 +143,8 @@ def at_instants(
     instant, when = instants(time, vehicle, step)
     new = np.r_[True, (np.diff(vehicle) != 0) | (np.diff(instant) != 0)]
     row = np.flatnonzero(new)
-    missing = np.r_[np.diff(instant[row]) - 1, 0]
-    passed = np.r_[np.diff(time[row]), 0.0]
-    missing = np.where(np.r_[np.diff(vehicle[row]) == 0, False] & (passed <= MAX_GAP + 1e-9), missing, 0)
-    missing = np.maximum(missing, 0)
+    is_missed = (np.diff(vehicle[row]) == 0) & (np.diff(time[row]) <= MAX_GAP + 1e-9)
+    missing = np.r_[np.where(is_missed, np.maximum(np.diff(instant[row]) - 1, 0), 0), 0]
     last, following = np.repeat(row, missing), np.repeat(np.r_[row[1:], row[-1]], missing)  # about what is filled
     after = np.arange(len(last)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
     times = np.full(int(instant.max()) + 1, np.nan)
@@ -158,5 +156,6 @@ def at_instants(
     share = np.clip(later / np.maximum(time[following] - time[last], 1e-9), 0.0, 1.0)
     between = (share > 0.0) & (part[following] == part[last])
     way = along[last] + np.where(between, share * (along[following] - along[last]), speed[last] * later)
-    moved = along[row] + speed[row] * (when[row] - time[row])
-    return np.r_[row, last], np.r_[instant[row], filled], np.r_[moved, way], np.cumsum(new) - 1
+    when = along[row] + speed[row] * (when[row] - time[row])  # when, instant: no longer asked for at every row
+    instant = np.r_[instant[row], filled]
+    return np.r_[row, last], instant, np.r_[when, way], np.cumsum(new) - 1

@@ -14,7 +14,7 @@ from xosc_lateral.base.errors import FormatError, absent
 from xosc_lateral.base.texts import composed
 from xosc_lateral.extras.recordings.cuts import require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
-from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, read_fcd
+from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, of_rear_axles, read_fcd
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape, place_on_road
 from xosc_lateral.extras.recordings.lane_order import LaneGraph
@@ -150,13 +150,13 @@ def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> Recor
 
 
 def _fcd(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
-    if road is None or not road.name.lower().endswith(NET_ENDINGS):
-        if road is None:
-            raise FormatError("comes without lanes: give its network with --road FILE.net.xml", path=source)
-        return _on_road(read_fcd(source), source, road)
+    if road is None:
+        raise FormatError("comes without lanes: give its network with --road FILE.net.xml", path=source)
+    if not road.name.lower().endswith(NET_ENDINGS):
+        return _on_road(of_rear_axles(read_fcd(source)[0]), source, road)
     net = read_sumo_net(road)
     made = roads_of_lanes(lanes_of_net(net, road), name_of(source), left_handed=net.left_hand).encode()
-    return replace(_on_road(read_fcd(source), source, None, made), sources=(source, road))
+    return replace(_on_road(of_rear_axles(read_fcd(source)[0]), source, None, made), sources=(source, road))
 
 
 def _is_levelx(source: Path) -> bool:
@@ -278,7 +278,7 @@ def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedT
     if len(files) != 1:
         raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
     recording = levelx.Recording.read(files[0])
-    if not recording.is_highd:
+    if recording.layout != "highD":
         return _on_road(levelx.tracks_in(recording), files[0], road)
     made, tracks, _ = levelx.on_its_road(recording)
     return _made(made, tracks, files[0])

@@ -75,15 +75,11 @@ def read_sumo_net(path: Path) -> SumoNet:
     return net
 
 
-def fcd_vehicles(path: Path, outside: str) -> Iterator[tuple[float, Any]]:
-    """Time and element of each vehicle in FCD output. Raises `FormatError`: it is none; one is `outside` of a time."""
+def fcd_vehicles(path: Path) -> Iterator[tuple[float, Any]]:
+    """Time and element of each vehicle in FCD output. Raises `FormatError`: it is none; one is outside of a time."""
     if (tag := root_tag(path)) != "fcd-export":
         what = f"its root element is {tag!r}" if tag else "it is no XML"
         raise FormatError(f"no FCD output of SUMO: {what}", path=path)
-    return _timed_vehicles(path, outside)
-
-
-def _timed_vehicles(path: Path, outside: str) -> Iterator[tuple[float, Any]]:
     time = float("nan")
     for event, element in elements(path, ("timestep", "vehicle")):
         if event == "end":
@@ -94,7 +90,7 @@ def _timed_vehicles(path: Path, outside: str) -> Iterator[tuple[float, Any]]:
         elif np.isfinite(time):
             yield time, element
         else:
-            raise wrong_element(outside, element, path)
+            raise wrong_element("a vehicle outside a timestep", element, path)
 
 
 def is_left_handed(path: Path) -> bool:

@@ -202,17 +202,18 @@ def imported(table: pd.DataFrame, *, sources: Sequence[Path], step: float, **abo
 
     `dropped` in it: rows of the source that are not in the table, by reason.
     """
-    states, kept = table["state"].value_counts(), table["state"] == KEPT_ROWS
-    row_step = (
-        table.groupby("drive", sort=False)["time"].diff().groupby(table["drive"], sort=False).median().fillna(step)
-    )
+    states, kept = table["state"].value_counts(), (table["state"] == KEPT_ROWS).to_numpy()
+    drive, names = table["drive"].factorize()
+    ends = np.flatnonzero(np.diff(drive)) + 1
+    parts = zip(np.split(table["time"].to_numpy(), ends), np.split(kept, ends), strict=True)
+    seconds = sum(rows.sum() * (np.median(np.diff(time)) if len(time) > 1 else step) for time, rows in parts)
     counts = Counter({str(state): int(count) for state, count in states.items()}) + Counter(about.pop("dropped", {}))
     record = ImportRecord(
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
         rows=dict(sorted(counts.items())),
-        vehicles=int(table["drive"].nunique()),
-        hours=round(float(row_step.reindex(table.loc[kept, "drive"]).sum()) / 3600.0, 3),
+        vehicles=len(names),
+        hours=round(float(seconds) / 3600.0, 3),
         **about,
     )
     return ImportedDrives(table, record)

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -33,9 +33,10 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.rates import rate
-from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
+from xosc_lateral.base.vehicle_classes import TRUCKS
+from xosc_lateral.drivers.drives.evidence import FASTEST_ASIDE
 from xosc_lateral.drivers.drives.identity import identify
-from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, cut_table, require_lane_direction
+from xosc_lateral.extras.recordings.cuts import DEFAULT_CUTS, CutSettings, require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
 from xosc_lateral.extras.recordings.importers.track_table import Tracks, tracks_of
 from xosc_lateral.extras.recordings.importers.tracks import (
@@ -45,7 +46,7 @@ from xosc_lateral.extras.recordings.importers.tracks import (
     place_on_road,
     require_lanes,
 )
-from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE
+from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE, LaneGraph
 from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad
 from xosc_lateral.files.mapping import TableMapping, classes_of
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
@@ -79,26 +80,22 @@ def import_levelx(
     if not files:
         raise FormatError("no XX_tracks.csv in this folder", path=source)
     network = None if road is None else read_opendrive(road)
-    parts, layouts, steps, dropped, notes = [], set[str](), set[float](), Counter[str](), list[str]()
+    parts, layouts, dropped, notes = [], set[tuple[str, float]](), Counter[str](), list[str]()
     for path in files:
         recording = Recording.read(path)
-        layout = "highD" if recording.is_highd else "exiD" if recording.is_exid else "inD"
-        if layout == "exiD" and network is None:
-            table, lost = _from_exid(recording, settings), recording.dropped
-        else:
-            table, placed = _in_lanes(recording, network, settings, f"{layout.lower()}-{recording.number}-")
-            lost = Counter(placed.tracks.dropped)
-            notes += [*placed.notes(), *(mostly_beside(placed) if layout != "highD" else [])]
-        layouts.add(layout)
-        steps.add(1.0 / recording.frame_rate)
-        parts.append(table)
-        dropped += lost
-    if len(layouts) > 1 or len(steps) > 1:
+        placed, beside, more = _placed(recording, network)
+        notes += [*placed.notes(), *(mostly_beside(placed) if network is not None else [])]
+        table = drive_table(placed, beside, settings).assign(**more)
+        parts.append(table.assign(drive=f"{recording.layout.lower()}-{recording.number}-" + table["drive"]))
+        dropped += Counter(placed.tracks.dropped)
+        layouts.add((recording.layout, 1.0 / recording.frame_rate))
+    if len(layouts) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
-    about = {"format": f"levelx {layouts.pop()}", "licence": LICENCE, "settings": asdict(settings), "dropped": dropped}
-    sources = files if road is None else [*files, Path(road)]
-    table = pd.concat(parts, ignore_index=True)
-    return imported(table, sources=sources, step=steps.pop(), notes=tuple(notes), **about)
+    layout, step = layouts.pop()
+    return imported(
+        pd.concat(parts, ignore_index=True), sources=files if road is None else [*files, Path(road)], step=step,
+        notes=tuple(notes), format=f"levelx {layout}", licence=LICENCE, settings=asdict(settings), dropped=dropped,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,14 +128,10 @@ class Recording:
         return self.path.name.split("_")[0]
 
     @property
-    def is_highd(self) -> bool:
-        """Else its vehicles have middles."""
-        return "xCenter" not in self.tracks.columns
-
-    @property
-    def is_exid(self) -> bool:
-        """Whether rows say where in their lane they are."""
-        return "latLaneCenterOffset" in self.tracks.columns
+    def layout(self) -> str:
+        """Of highD; of exiD, whose rows say where in their lane they are; or of inD, rounD and uniD ("inD")."""
+        named = self.tracks.columns
+        return "highD" if "xCenter" not in named else "exiD" if "latLaneCenterOffset" in named else "inD"
 
     @property
     def frame_rate(self) -> float:
@@ -224,52 +217,41 @@ def tracks_in(recording: Recording) -> Tracks:
     return tracks_of(named, recording.path, TableMapping())
 
 
-def _in_lanes(
-    recording: Recording, network: RoadNetwork | None, settings: CutSettings, prefix: str
-) -> tuple[pd.DataFrame, PlacedTracks]:
-    """The drive table of a recording on a road."""
-    if recording.is_highd:
+def _placed(
+    recording: Recording, network: RoadNetwork | None
+) -> tuple[PlacedTracks, LaneGraph | dict[str, FloatArray], dict[str, FloatArray]]:
+    """A recording on a road, or in the lanes that its rows name; who is beside whom, and columns as recorded."""
+    if recording.layout == "highD":
         made, tracks, acceleration = on_its_road(recording)
         placed, graph = place_on_road(tracks, parse_opendrive(made.to_xml().encode(), made.name))
-        placed = replace(placed, road={name: placed.road[name] for name in ("lane_index", "lane_count")})
-        table = drive_table(placed, graph, settings).assign(acceleration=acceleration)
-    elif network is None:
+        placed.road = {name: placed.road[name] for name in ("lane_index", "lane_count")}
+        return placed, graph, {"acceleration": acceleration}
+    if network is None and recording.layout == "exiD":
+        return _in_named_lanes(recording)
+    if network is None:
         raise FormatError("comes without lanes: give its road with --road FILE.xodr", path=recording.path)
-    else:
-        placed, graph = place_on_road(tracks_in(recording), network)
-        require_lanes(placed, Path(network.path).name, recording.path)
-        table = drive_table(placed, graph, settings)
-    return table.assign(drive=prefix + table["drive"]), placed
+    placed, graph = place_on_road(tracks_in(recording), network)
+    require_lanes(placed, Path(network.path).name, recording.path)
+    return placed, graph, {}
 
 
-def _from_exid(recording: Recording, settings: CutSettings) -> pd.DataFrame:
+def _in_named_lanes(recording: Recording) -> tuple[PlacedTracks, dict[str, FloatArray], dict[str, FloatArray]]:
+    """ExiD's rows say where in their lane they are, and who is beside them."""
     recording.require(EXID_COLUMNS)
-    step, tracks = 1.0 / recording.frame_rate, recording.identified("trackId", "xCenter", "yCenter")
-    kind = recording.classes(recording.meta.set_index("trackId").reindex(tracks["trackId"]))
-    offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])
-    vehicle, frame = tracks["vehicle"].to_numpy(), tracks["frame"].to_numpy()
+    table = recording.identified("trackId", "xCenter", "yCenter")
+    offset, width = _first(table["latLaneCenterOffset"]), _first(table["laneWidth"])
+    x, y, speed, length, acceleration = (
+        table[name].to_numpy(dtype=np.float64)
+        for name in ("xCenter", "yCenter", "lonVelocity", "length", "lonAcceleration")
+    )
+    kinds = recording.classes(recording.meta.set_index("trackId").reindex(table["trackId"]))
+    heading, vehicle, step = np.radians(table["heading"].to_numpy()), table["vehicle"].to_numpy(), recording.frame_rate
+    when = tuple(table["name"].unique()), vehicle, table["frame"].to_numpy() / step, 1.0 / step
+    tracks = Tracks(*when, x, y, heading, speed, length, kinds, dropped=recording.dropped)
     known = np.isfinite(offset) & np.isfinite(width) & (width > 0.0)
-    # A new lane shows as a step of the offset; lanelets that follow one another along the road don't.
-    step_of_offset = np.diff(offset, prepend=offset[:1])
-    jump = (np.abs(step_of_offset) > 0.5 * width) | (tracks["laneChange"].to_numpy() == 1)
-    jump &= np.r_[False, vehicle[1:] == vehicle[:-1]]
-    lane = np.cumsum(jump).astype(np.int64)
-    lateral = np.cumsum(np.where(jump | ~np.isfinite(step_of_offset), 0.0, step_of_offset))
-    offset = offset * _left_sign(lateral, tracks, vehicle, step, recording.path)
-    is_truck = np.isin(kind, list(TRUCKS))
-    columns = {
-        "drive": f"exid-{recording.number}-" + tracks["name"],
-        "time": np.round(frame * step, 4),
-        "offset": offset,
-        "lane_width": width,
-        "speed": tracks["lonVelocity"].to_numpy(),
-        "acceleration": tracks["lonAcceleration"].to_numpy(),
-        **_exid_neighbours(tracks, is_truck),
-    }
-    return cut_table(
-        columns, settings, vehicle=vehicle, time=frame * step, lane=lane, step=step, sideways=lateral,
-        reasons={"no vehicle": ~np.isin(kind, list(DRIVEN)), "no lane": ~known}, kind=kind, is_truck=is_truck,
-    )  # fmt: skip
+    offset = offset * _left_sign(offset, tracks, recording.path)
+    placed = PlacedTracks(tracks, np.where(known, 0, -1), np.zeros(len(x)), offset, width, np.ones(len(x)))
+    return placed, _exid_neighbours(table, np.isin(kinds, list(TRUCKS))), {"acceleration": acceleration}
 
 
 def _first(column: pd.Series) -> FloatArray:
@@ -280,21 +262,21 @@ def _first(column: pd.Series) -> FloatArray:
     return np.asarray(pd.to_numeric(first, errors="coerce").to_numpy(dtype=np.float64))
 
 
-def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
+def _left_sign(offset: FloatArray, tracks: Tracks, path: Path) -> float:
     """+1 if the offset grows when a vehicle heads to the left of its lane's course, -1 if it shrinks.
 
-    By the correlation of its rate with the way to the left, by the heading less its own mean over 4 s (the road's
-    course).
+    By the correlation of its rate, but where a lane changes, with the way to the left, by the heading less its own mean
+    over 4 s (the road's course).
     """
-    heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
-    half = max(1, round(2.0 / step))
+    half, vehicle = max(1, round(2.0 / tracks.step)), tracks.vehicle
     inside = np.arange(half, max(half, len(vehicle) - half))
     inside = inside[vehicle[inside + half] == vehicle[inside - half]]
     if len(inside) < 100:
         raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to find which side is left")
-    towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
-    aside = _about_mean(rate(lateral, 1.0), inside, half)
-    agreement = float(np.corrcoef(towards_left, aside)[0, 1])
+    moved = rate(offset, tracks.step)
+    moved = np.where(np.abs(moved) < FASTEST_ASIDE, moved, 0.0)
+    towards_left = tracks.speed[inside] * _about_mean(np.unwrap(tracks.heading), inside, half)
+    agreement = float(np.corrcoef(towards_left, _about_mean(moved, inside, half))[0, 1])
     if not abs(agreement) > 0.1:
         what = f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}"
         raise FormatError(what, path=path, element="latLaneCenterOffset")

@@ -20,7 +20,7 @@ from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import ON_ROADS
 from xosc_lateral.drivers.drives.cleaning import MAX_MEDIAN_SPEED
 from xosc_lateral.drivers.drives.evidence import of_clock
-from xosc_lateral.drivers.drives.identity import apart_in_time, identify
+from xosc_lateral.drivers.drives.identity import LONGEST_GAP, identify
 from xosc_lateral.extras.recordings import evidence
 from xosc_lateral.extras.recordings.cuts import MOVING_SPEED, require_headings
 from xosc_lateral.files.columns import (
@@ -95,7 +95,7 @@ class Tracks:
     heading: FloatArray
     speed: FloatArray
     length: FloatArray
-    kind: NDArray[np.str_]
+    kind: NDArray[Any]  # words
     width: FloatArray | None = None
     is_reference: bool = False  # positions are those of the reference point, as `play` writes them, not of the middle
     rear: FloatArray | None = None  # how far x and y lie behind the vehicle's middle; None: they are the middle [m]
@@ -137,6 +137,19 @@ LEAST_FRAME_RATE, FRAME_RATE_AGREED = 5, 0.1  # slower, and 3.6, 3.28 or 2.24, a
 SPEED_WINDOW = 0.4  # positions are differenced over this where no speed was recorded [s]
 
 
+def apart_in_time(time: FloatArray, recording: IntArray, step: float) -> FloatArray:
+    """Times at which nobody of one recording meets somebody of another, shape (n,). [s]"""
+    if not recording.any():
+        return time
+    clock, at = np.empty(len(time)), 0.0
+    for number in np.unique(recording):
+        mine = recording == number
+        begin = float(time[mine].min())
+        clock[mine] = time[mine] - begin + at
+        at = step * np.ceil((float(clock[mine].max()) + 10.0 * LONGEST_GAP) / step)
+    return clock
+
+
 def travelled(x: FloatArray, y: FloatArray, vehicle: IntArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Heading [rad] and speed [m/s] from positions, shape (n,)."""
     vx, vy = (rate(each, time, SPEED_WINDOW, whose=vehicle) for each in (x, y))
@@ -174,7 +187,8 @@ def tracks_of(table: pd.DataFrame, path: Path, saved: TableMapping, *, is_log: b
     if "vehicle_class" in rows:
         number, words = rows.pop("vehicle_class").factorize()
         kind, usual = (
-            np.array(each)[number] for each in (list(words), [USUAL_LENGTH.get(word, 4.6) for word in words])
+            np.array(each, dtype=of)[number]  # words as objects: eight bytes a row, however long they are
+            for each, of in ((list(words), object), ([USUAL_LENGTH.get(word, 4.6) for word in words], None))
         )
     more: dict[str, Any] = {name: rows.pop(name).to_numpy() for name in list(rows.columns)}
     velocity = more.pop("vx", None), more.pop("vy", None)  # along which axes, only their hypotenuse does not ask

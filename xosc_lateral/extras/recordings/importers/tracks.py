@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -48,9 +48,9 @@ POINT_SPACING = 1.0  # of a centre line, at most, so that the nearest point is n
 END_TOLERANCE = 1e-3  # a foot that lies farther than this before the start or past the end is outside [m]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class PlacedTracks:
-    """Tracks and where each of their rows lies; arrays of shape (n,)."""
+    """Tracks and where each of their rows lies; arrays of shape (n,). `drive_table` takes out what it has used."""
 
     tracks: Tracks
     piece: IntArray  # of the lane graph; -1: in no lane
@@ -65,6 +65,12 @@ class PlacedTracks:
         """Those of the tracks, and whether they lie beside their lanes."""
         shift = of_registration(self.offset, self.lane_width, self.tracks.vehicle, self.tracks.heading)
         return (*self.tracks.notes, *([shift] if shift else []))
+
+    def take(self, name: str) -> Any:
+        """A column that nobody asks for after this: millions of rows are there once."""
+        values = getattr(self, name)
+        setattr(self, name, np.zeros(0))
+        return values
 
 
 @importer
@@ -137,25 +143,37 @@ def import_placed(
     if placed.tracks.step > MAX_GAP:
         what = f"rows are {placed.tracks.step:.4g} s apart (median): from {MAX_GAP:g} s on no drive can be made of them"
         raise FormatError(what, path=about["sources"][0], element="column 'time'")
+    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *placed.notes())))
     table = drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
     tracks = placed.tracks
-    notes = tuple(dict.fromkeys((*about.pop("notes", ()), *placed.notes())))
     return imported(
         table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
     )  # fmt: skip
 
 
-def drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
-    """The standard columns, with `state`: which rows are cut, and why."""
+def drive_table(
+    placed: PlacedTracks, beside: LaneGraph | Mapping[str, FloatArray], settings: CutSettings
+) -> pd.DataFrame:
+    """The standard columns, with `state`: which rows are cut, and why; `beside`: columns of neighbours, or the lanes
+    in which they are sought."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, list(TRUCKS))
-    middle = placed.along if tracks.rear is None else placed.along + tracks.rear  # gaps count from there
-    near = neighbour_columns(
-        graph, placed.piece, middle, tracks.clock(), tracks.vehicle, tracks.step, tracks.speed, tracks.length, is_truck,
-        scale=placed.scale,
+    acceleration = rate(tracks.speed, tracks.time, 1.0, whose=tracks.vehicle)
+    against = (tracks.speed > MOVING_SPEED) & (placed.take("agreement") < 0.0)
+    reasons = {"no vehicle": ~np.isin(tracks.kind, ["", *DRIVEN]), "no lane": ~inside}
+    reasons |= {"against the lane": against & inside} if against.any() else {}
+    along = placed.take("along")
+    middle = along if tracks.rear is None else along + tracks.rear  # gaps count from there
+    gone = np.zeros(0)
+    tracks = placed.tracks = replace(tracks, x=gone, y=gone, heading=gone, width=None, height=None, rear=None)
+    del along
+    near = beside if isinstance(beside, Mapping) else neighbour_columns(
+        beside, placed.take("piece"), middle, tracks.clock(), tracks.vehicle, tracks.step, tracks.speed, tracks.length,
+        is_truck, scale=placed.take("scale"),
     )  # fmt: skip
+    del middle
     # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
     step = np.diff(placed.offset, prepend=placed.offset[:1])
     same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
@@ -169,13 +187,10 @@ def drive_table(placed: PlacedTracks, graph: LaneGraph, settings: CutSettings) -
         "offset": placed.offset,
         "lane_width": placed.lane_width,
         "speed": tracks.speed,
-        "acceleration": rate(tracks.speed, tracks.time, 1.0, whose=tracks.vehicle),
+        "acceleration": acceleration,
         **placed.road,
         **near,
     }
-    against = (tracks.speed > MOVING_SPEED) & (placed.agreement < 0.0)
-    reasons = {"no vehicle": ~np.isin(tracks.kind, ["", *DRIVEN]), "no lane": ~inside}
-    reasons |= {"against the lane": against & inside} if against.any() else {}
     return cut_table(
         columns, settings, vehicle=tracks.vehicle, time=tracks.time, lane=lane, step=tracks.step, sideways=sideways,
         reasons=reasons, kind=tracks.kind, is_truck=is_truck,
