@@ -41,7 +41,8 @@ TELLING = {
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
     "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
     "turns at rest": "turns",
-    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "move sideways",
+    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides",
+    "rests": "move sideways|times what was sampled|are none|stays as it is",
 }  # fmt: skip
 """Words of the messages that tell a kind, by how it begins."""
 DIFFERS = "in esmini|not played"
@@ -216,9 +217,13 @@ def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False
     more = np.where(leaps, 0.0, strays[1] - widest(strays[0], 100))
     if more.max() > FRAME_WAY:
         yield "jumps along", source[more.argmax(), 0], more.max()
-    if shifted == np.inf and tuple(source[-1, 5:7]) != tuple(other[-1, 5:7]):
+    aside = (other[:, 2] - source[:, 2]) * np.cos(source[:, 3]) - (other[:, 1] - source[:, 1]) * np.sin(source[:, 3])
+    is_other = (source[:, 5:7] != other[:, 5:7]).any(1)  # roads of a junction lie over each other: where it is counts
+    if shifted == np.inf and is_other[-1] and abs(aside[-1]) > 0.5 * spec["road"].get("width", 3.5):
         yield "last lane is another", source[-1, 0], 1.0
-    beyond = [_beyond(spec, who, rows) for rows in (source, other)]
+    there = other.copy()
+    there[is_other, 7] = np.abs(aside[is_other]) + np.abs(source[is_other, 7])
+    beyond = [_beyond(spec, who, rows) for rows in (source, there)]
     calm = (source[:, 0] < shifted) & (widest(np.abs(np.diff(source[:, 7], prepend=source[0, 7])), 100) < 1e-4)
     past = np.where(calm & (beyond[0] <= 0.0), beyond[1], 0.0)
     if replay is not None and past.max() > SWERVE:
@@ -227,9 +232,6 @@ def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False
             yield "swerves", source[past.argmax(), 0], past.max()
     drives = (source[:, 4] > look.DRIVING_SPEED) & ~own
     if drives.sum() > 4.0 / 0.01:
-        aside = (other[:, 2] - source[:, 2]) * np.cos(source[:, 3]) - (other[:, 1] - source[:, 1]) * np.sin(
-            source[:, 3]
-        )
         width = np.ptp(sliding_window_view(aside, 200), axis=1)[sliding_window_view(drives, 200).all(1)]
         if len(width) > 200 and np.mean(width > 2.0 * look.MOVED) < 0.8:
             yield "rests beside its way", source[drives.argmax(), 0], 1.0 - float(np.mean(width > 2.0 * look.MOVED))

@@ -34,4 +34,3 @@ def driver_in(folder: Path) -> Callable[..., list[Drive]]:
 def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
     """Drives in a folder of the test's own."""
     return driver_in(tmp_path)
-

@@ -89,8 +89,9 @@ def _lane_beside(ego: EntityMotion, network: RoadNetwork) -> int:
     row = min(int(np.searchsorted(ego.time, LANE_CHANGE_START)), len(ego.time) - 1)
     road, lane, s = int(ego.road[row]), int(ego.lane[row]), float(ego.s[row])
     there = {one.id: one.type for one in network.lanes_at(road, s)} if road >= 0 else {}
-    both = (lane + np.sign(lane) * side for side in (-1, 1))  # towards the middle of the road first
-    return next((int(one) for one in both if one and there.get(int(one)) in DRIVING), 0)
+    side = int(np.sign(lane))
+    nearest = (lane - side, lane + side, -side)  # towards the middle of the road first, that of oncoming traffic last
+    return next((one for one in nearest if one and there.get(one) in DRIVING), 0)
 
 
 def with_speeds(

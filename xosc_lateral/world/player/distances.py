@@ -129,6 +129,11 @@ def _path_between(state: EntityState, here: Spot, spot: Spot, limit: float = UNR
     if here.road == NO_ROAD or spot.road == NO_ROAD:
         return None
     direction = 1 if state.is_forward else -1
+    if (
+        here.road != state.road and state.road != NO_ROAD
+    ):  # a corner beyond a joint, perhaps of roads that run towards it
+        onto = state.network.path_between((state.road, state.s), (here.road, here.s))
+        direction = -direction if onto is not None and onto.is_turned else direction
     return state.network.path_between((here.road, here.s), (spot.road, spot.s), direction=direction, limit=limit)
 
 
@@ -143,6 +148,7 @@ class Measure(Struct, frozen=True, eq=False):
     system: CoordinateSystem
     kind: RelativeDistanceType
     freespace: bool = False
+    note: Callable[[str, EntityState], None] = lambda what, state: None  # of what esmini measures otherwise
 
     @property
     def is_along_roads(self) -> bool:
@@ -180,7 +186,7 @@ class Measure(Struct, frozen=True, eq=False):
         elif overlap(state, other):
             return 0.0
         else:
-            gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
+            gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
         return gap
 
     def _at_least(self, state: EntityState, other: EntityState) -> float:
@@ -189,10 +195,16 @@ class Measure(Struct, frozen=True, eq=False):
         """
         sizes = _reach(state) + _reach(other) if self.freespace else 0.0
         least = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes
-        if least > 0.0 and self.freespace and min(_room(state), _room(other)) > 0.0:
+        if least > 0.0 and self.freespace:
             path = _path_between(state, spot_of(state), spot_of(other))
-            stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
-            return least if path is None else max(least, abs(path.ds) - stretch * sizes)
+            if path is None:
+                self.note(
+                    f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest",
+                    state,
+                )
+            elif min(_room(state), _room(other)) > 0.0:
+                stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
+                return max(least, abs(path.ds) - stretch * sizes)
         return least
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
@@ -229,17 +241,26 @@ class Measure(Struct, frozen=True, eq=False):
         along, across = box_gaps(ours, shape, state.network.header_offset.heading if in_world else along_own)
         return across if self.kind is RelativeDistanceType.LATERAL else along
 
-    def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
+    def _between_corners(self, state: EntityState, spots: list[Spot], name: str = "") -> float | None:
         """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
         state.locate()
-        values = []
+        rows = list[list[float]]()
         for place in (_project(state, x, y) for x, y in corners(state)):
-            for spot in spots:
-                path = _path_between(state, place, spot)
-                if path is None:
-                    return None
-                values.append(_across(place, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
-        return 0.0 if min(values) < 0.0 <= max(values) else min(values, key=abs)
+            paths = [(spot, _path_between(state, place, spot)) for spot in spots]
+            ways = [(spot, path) for spot, path in paths if path is not None]
+            if len(ways) < len(spots):
+                return None
+            lateral = self.kind is RelativeDistanceType.LATERAL
+            rows.append([_across(place, spot, path) if lateral else path.ds for spot, path in ways])
+        low, high = min(map(min, rows)), max(map(max, rows))
+        nearest = min((value for row in rows for value in row), key=abs)
+        # On both sides of each other, and no farther than boxes reach: ways round a ring lead to either side, too.
+        reach = 2.0 * _reach(state) + max(hypot(spot.x - spots[0].x, spot.y - spots[0].y) for spot in spots)
+        beside = low < 0.0 <= high and high - low <= 2.0 * reach
+        if name and beside is not any(min(row) < 0.0 <= max(row) for row in rows):
+            what = "beside all of" if beside else "nowhere beside"
+            self.note(f"it is {what} '{name}' along the road; in esmini, its free space is as if it were not so", state)
+        return 0.0 if beside else nearest
 
 
 def _train(state: EntityState) -> list[EntityState]:

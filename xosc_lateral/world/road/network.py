@@ -11,6 +11,7 @@ floats and are made for stepping one vehicle at a time: a few microseconds each,
 from __future__ import annotations
 
 from collections.abc import Collection
+from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.note import Note
-from xosc_lateral.world.road.index import LANE_TOLERANCE, SurfaceIndex
+from xosc_lateral.world.road.index import LANE_TOLERANCE, SAME_LEVEL_HEIGHT, SurfaceIndex, refuse_nan
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.positions import LaneCoordinates, LaneInfo, LaneState, Pose, RoadMark
 from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, project_at, surface_pose
@@ -174,14 +175,28 @@ class RoadNetwork(SurfaceIndex, Routes):
         return located
 
     def _nearest_lane(self, x: float, y: float, z: float | None, lane_types: Collection[str] | None) -> LaneCoordinates:
-        key = x, y, z, lane_types if lane_types is None else frozenset(lane_types)
-        if (place := self._found.get(key)) is None:
-            best = self.world_to_lane(x, y, z, lane_types=lane_types)
-            place = LaneCoordinates(int(best.road), int(best.lane), *(float(values) for values in best[2:]))
+        types = lane_types if lane_types is None else frozenset(lane_types)
+        key = x, y, z, types
+        if key not in self._found:
             if len(self._found) >= MOST_FOUND:
                 self._found.clear()
-            self._found[key] = place
-        return place
+            at_x, at_y = refuse_nan([np.array([x]), np.array([y])])
+            near = self._candidates(at_x, at_y, types)
+            places = (
+                self._ranked(*each, x, y, z, types) for each in zip(near.road.tolist(), near.s.tolist(), strict=True)
+            )
+            self._found[key] = min(places)[-1]
+        return self._found[key]
+
+    def _ranked(
+        self, road: int, guess: float, x: float, y: float, z: float | None, types: Collection[str] | None
+    ) -> tuple[float, float, int, LaneCoordinates]:
+        """A place near a point, after what makes it worse than others, as `SurfaceIndex` has it for many. [m]"""
+        s, t, ahead = project_at(self.roads[road], x, y, guess)
+        place = lane_at(self.roads[road], road, s, t, types)
+        place = place._replace(distance=hypot(place.distance, ahead))
+        above = 0.0 if z is None else max(abs(z - self.roads[road].surface.at(s, t)[0]) - SAME_LEVEL_HEIGHT, 0.0)
+        return round(place.distance + above, 9), round(abs(place.offset), 9), road, place
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:

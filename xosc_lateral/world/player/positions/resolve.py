@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from math import cos, nan, pi, sin
 
 import numpy as np
@@ -62,16 +63,20 @@ def pose_of(position: positions.Position, simulation: Simulation) -> Pose:
 
 
 def poses_of(places: Sequence[positions.Position], simulation: Simulation) -> list[Pose]:
-    """World poses of many positions now; a path beside one entity is found on one way along the road."""
-    beside = list[positions.RelativeRoadPosition]()
-    for place in places:
-        if not isinstance(place, positions.RelativeRoadPosition) or place.orientation is not None:
-            break
-        if beside and place.entity_ref != beside[0].entity_ref:
-            break
-        beside.append(place)
-    poses = _poses_beside(beside, simulation) if beside else []
-    return poses + [pose_of(place, simulation) for place in places[len(beside) :]]
+    """World poses of many positions now; those in turn beside one entity are found on one way along the road."""
+    poses = list[Pose]()
+    for _, some in groupby(places, _follows):
+        group = list(some)
+        beside = [place for place in group if isinstance(place, positions.RelativeRoadPosition) and _follows(place)]
+        poses += _poses_beside(beside, simulation) if beside else [pose_of(place, simulation) for place in group]
+    return poses
+
+
+def _follows(place: positions.Position) -> str | None:
+    """The entity beside whose way along the road a position is, turned as the road is."""
+    if isinstance(place, positions.RelativeRoadPosition) and place.orientation is None:
+        return place.entity_ref
+    return None
 
 
 def _poses_beside(places: Sequence[positions.RelativeRoadPosition], simulation: Simulation) -> list[Pose]:
