@@ -155,29 +155,34 @@ class Measure(Struct, frozen=True, eq=False):
         """Whether it needs road coordinates."""
         return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
 
-    def between(self, state: EntityState, target: Spot | EntityState, *, enough: float = inf) -> float:
+    def between(
+        self, state: EntityState, target: Spot | EntityState, *, enough: float = inf, near: float = -inf
+    ) -> float:
         """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]
 
-        `enough`: what is farther, ahead or behind, need not be exact [m]
+        `enough`: what is farther, ahead or behind, need not be exact; `near`: what is nearer, and on which side [m]
         """
-        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target, enough)
+        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target, enough, near)
         return UNREACHABLE_DISTANCE if gap is None else gap
 
-    def _to_train(self, state: EntityState, target: EntityState, enough: float) -> float | None:
+    def _to_train(self, state: EntityState, target: EntityState, enough: float, near: float) -> float | None:
         """Free space is that of the nearest two."""
         pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)] if self.freespace else []
         if len(pairs) < 2:
-            return self.to_entity(state, target, enough=enough)
+            return self.to_entity(state, target, enough=enough, near=near)
         nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
-        gaps = [nearness.to_entity(*pair, enough=enough) for pair in pairs]
+        gaps = [nearness.to_entity(*pair, enough=enough, near=near) for pair in pairs]
         gap, nearest = min(zip(gaps, pairs, strict=True), key=lambda each: inf if each[0] is None else abs(each[0]))
         return gap if nearness is self else self.to_entity(*nearest)
 
-    def to_entity(self, state: EntityState, other: EntityState, *, enough: float = inf) -> float | None:
-        """From one entity to another, exact up to `enough`. [m]"""
-        may_be_far = enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL
-        if may_be_far and (least := self._at_least(state, other)) > enough + MARGIN:
-            return least
+    def to_entity(
+        self, state: EntityState, other: EntityState, *, enough: float = inf, near: float = -inf
+    ) -> float | None:
+        """From one entity to another, exact from `near` to `enough`. [m]"""
+        if enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL:
+            least, most = self._bounds(state, other)
+            if least > enough + MARGIN or most < near - MARGIN:
+                return least if least > enough else most
         if not self.freespace:
             pose = other.plane
             gap = self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(pose.x, pose.y))
@@ -189,23 +194,26 @@ class Measure(Struct, frozen=True, eq=False):
             gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
         return gap
 
-    def _at_least(self, state: EntityState, other: EntityState) -> float:
-        """How far away it is at least, ahead or behind: by where both are, else from one's place on its road to the
-        other's. No road bends so much that a way is half as long along its reference line.
+    def _bounds(self, state: EntityState, other: EntityState) -> tuple[float, float]:
+        """How far away it is at least and at most, ahead or behind: by where both are, and from one's place on its road
+        to the other's, which are beside their boxes. No road bends so much that a way is half as long along its
+        reference line.
         """
-        sizes = _reach(state) + _reach(other) if self.freespace else 0.0
-        least = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes
-        if least > 0.0 and self.freespace:
-            path = _path_between(state, spot_of(state), spot_of(other))
-            if path is None:
-                self.note(
-                    f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest",
-                    state,
-                )
-            elif min(_room(state), _room(other)) > 0.0:
-                stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
-                return max(least, abs(path.ds) - stretch * sizes)
-        return least
+        least, most = 0.5 * apart(state, other.plane.x, other.plane.y), inf
+        if not self.freespace:
+            return least, most
+        sizes, rooms = _reach(state) + _reach(other), min(_room(state), _room(other))
+        least -= sizes
+        is_on_roads, ends = NO_ROAD not in (state.road, other.road), ((state.road, state.s), (other.road, other.s))
+        path = state.network.path_between(*ends) if is_on_roads else None
+        if path is not None and rooms > 0.0:
+            stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
+            most = abs(path.ds) + stretch * (_beside_box(state) + _beside_box(other))
+            least = max(least, abs(path.ds) - stretch * sizes)
+        elif path is None and is_on_roads:
+            what = f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest"
+            self.note(what, state)
+        return least, most
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
         """From an entity to a spot. [m]"""
@@ -328,6 +336,12 @@ def _reach(state: EntityState) -> float:
     """No corner of its box is further from its reference point. [m]"""
     box = state.entity.bounding_box
     return hypot(0.5 * box.length + abs(box.center_x), 0.5 * box.width + abs(box.center_y))
+
+
+def _beside_box(state: EntityState) -> float:
+    """How far its reference point is ahead of its box, or behind it. [m]"""
+    box = state.entity.bounding_box
+    return max(abs(box.center_x) - 0.5 * box.length, 0.0) + max(abs(box.center_y) - 0.5 * box.width, 0.0)
 
 
 def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:

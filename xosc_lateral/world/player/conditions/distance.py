@@ -52,11 +52,11 @@ def measure_of(content: conditions.Measured | conditions.RelativeDistanceConditi
 
 
 def _amount(measure: Measure, state: EntityState, target: Spot | EntityState, enough: float = inf) -> float:
-    """Never negative; exact up to `enough`. [m]"""
+    """Never negative; exact where it is `enough`. [m]"""
     if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
         place = target.plane if isinstance(target, EntityState) else target
         return apart(state, place.x, place.y)
-    return abs(measure.between(state, target, enough=enough))
+    return abs(measure.between(state, target, enough=enough, near=enough))
 
 
 def prepare_distance(content: conditions.DistanceCondition, simulation: Simulation) -> EntityCheck:
