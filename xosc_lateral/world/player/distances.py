@@ -107,12 +107,11 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNRE
     return gap and replace(gap, ds=ds)
 
 
-def is_turned(state: EntityState, other: EntityState) -> bool:
-    """Whether s runs the other way on the road of another entity: +t is on the other side there."""
-    if state.road == other.road:
-        return False
-    gap = road_gap(state, spot_of(other))
-    return gap is not None and gap.is_turned
+def is_turned(state: EntityState, road: int, s: float) -> bool:
+    """Whether s runs the other way at a place on a road: +t is on the other side there. [m]"""
+    ends = (state.road, state.s), (road, s)
+    path = None if NO_ROAD in (road, state.road) or road == state.road else state.network.path_between(*ends)
+    return path is not None and path.is_turned
 
 
 def _gap_between(state: EntityState, here: Spot, spot: Spot, limit: float) -> RoadGap | None:
@@ -128,12 +127,8 @@ def _path_between(state: EntityState, here: Spot, spot: Spot, limit: float = UNR
     """The way that an entity would drive from one place to another; None: there is none."""
     if here.road == NO_ROAD or spot.road == NO_ROAD:
         return None
-    direction = 1 if state.is_forward else -1
-    if (
-        here.road != state.road and state.road != NO_ROAD
-    ):  # a corner beyond a joint, perhaps of roads that run towards it
-        onto = state.network.path_between((state.road, state.s), (here.road, here.s))
-        direction = -direction if onto is not None and onto.is_turned else direction
+    # a corner may be beyond a joint of roads that run towards each other
+    direction = 1 if state.is_forward is not is_turned(state, here.road, here.s) else -1
     return state.network.path_between((here.road, here.s), (spot.road, spot.s), direction=direction, limit=limit)
 
 
@@ -184,31 +179,31 @@ class Measure(Struct, frozen=True, eq=False):
             if least > enough + MARGIN or most < near - MARGIN:
                 return least if least > enough else most
         if not self.freespace:
-            pose = other.plane
-            gap = self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(pose.x, pose.y))
-        elif not self.is_along_roads:
+            return self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(other.plane.x, other.plane.y))
+        if not self.is_along_roads:
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
-        elif overlap(state, other):
+        if overlap(state, other):
             return 0.0
-        else:
-            gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
-        return gap
+        return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
 
     def _bounds(self, state: EntityState, other: EntityState) -> tuple[float, float]:
         """How far away it is at least and at most, ahead or behind: by where both are, and from one's place on its road
         to the other's, which are beside their boxes. No road bends so much that a way is half as long along its
         reference line.
         """
-        least, most = 0.5 * apart(state, other.plane.x, other.plane.y), inf
+        sizes = _reach(state) + _reach(other) if self.freespace else 0.0
+        least, most = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes, inf
         if not self.freespace:
             return least, most
-        sizes, rooms = _reach(state) + _reach(other), min(_room(state), _room(other))
-        least -= sizes
+        rooms = min(_room(state), _room(other))
         is_on_roads, ends = NO_ROAD not in (state.road, other.road), ((state.road, state.s), (other.road, other.s))
         path = state.network.path_between(*ends) if is_on_roads else None
         if path is not None and rooms > 0.0:
             stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
-            most = abs(path.ds) + stretch * (_beside_box(state) + _beside_box(other))
+            # a reference point may be beside its own box
+            boxes = (one.entity.bounding_box for one in (state, other))
+            beside = (max(abs(box.center_x) - 0.5 * box.length, abs(box.center_y) - 0.5 * box.width) for box in boxes)
+            most = abs(path.ds) + 2.0 * stretch * sum(max(gap, 0.0) for gap in beside)
             least = max(least, abs(path.ds) - stretch * sizes)
         elif path is None and is_on_roads:
             what = f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest"
@@ -220,8 +215,9 @@ class Measure(Struct, frozen=True, eq=False):
         if self.freespace:
             if self.is_along_roads:
                 return self._between_corners(state, [spot])
-            point = spot.x, spot.y
-            return self._between_boxes(state, (point,), lambda: holds_point(corners(state), point))
+            return self._between_boxes(
+                state, ((spot.x, spot.y),), lambda: holds_point(corners(state), (spot.x, spot.y))
+            )
         if self.kind is RelativeDistanceType.EUCLIDIAN:
             return straight_distance(state, spot.x, spot.y)
         lateral = self.kind is RelativeDistanceType.LATERAL
@@ -235,9 +231,7 @@ class Measure(Struct, frozen=True, eq=False):
             ahead, left = ahead_and_left(state, spot.x, spot.y)
             return left if lateral else ahead
         gap = road_gap(state, spot)
-        if gap is None:
-            return None
-        return gap.dt if lateral else gap.ds
+        return None if gap is None else gap.dt if lateral else gap.ds
 
     def _between_boxes(self, state: EntityState, shape: tuple[Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
@@ -338,12 +332,6 @@ def _reach(state: EntityState) -> float:
     return hypot(0.5 * box.length + abs(box.center_x), 0.5 * box.width + abs(box.center_y))
 
 
-def _beside_box(state: EntityState) -> float:
-    """How far its reference point is ahead of its box, or behind it. [m]"""
-    box = state.entity.bounding_box
-    return max(abs(box.center_x) - 0.5 * box.length, 0.0) + max(abs(box.center_y) - 0.5 * box.width, 0.0)
-
-
 def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
     """Corners of an entity's box, counter-clockwise from front left."""
     box, pose = state.entity.bounding_box, state.plane
@@ -359,13 +347,9 @@ def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
 
 def axis_gap(corners_: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> float:
     """Signed gap from `corners_` to `other` along an axis; 0 where their shadows overlap."""
-    mine = [x * axis[0] + y * axis[1] for x, y in corners_]
-    theirs = [x * axis[0] + y * axis[1] for x, y in other]
-    if max(mine) < min(theirs) - EPSILON:
-        return min(theirs) - max(mine)
-    if min(mine) > max(theirs) + EPSILON:
-        return max(theirs) - min(mine)
-    return 0.0
+    mine, theirs = ([x * axis[0] + y * axis[1] for x, y in shape] for shape in (corners_, other))
+    ahead, behind = min(theirs) - max(mine), max(theirs) - min(mine)
+    return ahead if ahead > EPSILON else behind if behind < -EPSILON else 0.0
 
 
 def overlap(a: EntityState, b: EntityState) -> bool:
@@ -381,27 +365,27 @@ def overlap(a: EntityState, b: EntityState) -> bool:
 
 def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
     """Shortest distance between the outlines of two convex shapes that don't overlap; either may be a point."""
-    best = inf
-    for points, outline in ((a, b), (b, a)):
-        edges = list(zip(outline, outline[1:] + outline[:1], strict=True))
-        for point in points:
-            for start, end in edges:
-                ux, uy = end[0] - start[0], end[1] - start[1]
-                length = ux * ux + uy * uy
-                u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
-                u = min(max(u, 0.0), 1.0)
-                best = min(best, hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy))
-    return best
+    return min(
+        _to_edge(point, start, end)
+        for points, outline in ((a, b), (b, a))
+        for start, end in zip(outline, outline[1:] + outline[:1], strict=True)
+        for point in points
+    )
+
+
+def _to_edge(point: Point, start: Point, end: Point) -> float:
+    ux, uy = end[0] - start[0], end[1] - start[1]
+    length = ux * ux + uy * uy
+    u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
+    u = min(max(u, 0.0), 1.0)
+    return hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy)
 
 
 def holds_point(box: tuple[Point, ...], point: Point) -> bool:
     """Whether a point is inside a box given by its corners."""
     (ax, ay), (bx, by), _, (dx, dy) = box
-    for ux, uy in ((bx - ax, by - ay), (dx - ax, dy - ay)):
-        along = (point[0] - ax) * ux + (point[1] - ay) * uy
-        if not 0.0 <= along <= ux * ux + uy * uy:
-            return False
-    return True
+    sides = (bx - ax, by - ay), (dx - ax, dy - ay)
+    return all(0.0 <= (point[0] - ax) * ux + (point[1] - ay) * uy <= ux * ux + uy * uy for ux, uy in sides)
 
 
 def box_gaps(shape_: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:
