@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from xosc_lateral.drivers.evaluation.snippets import FAMILIES, SnippetCondition
+from xosc_lateral.drivers.evaluation.snippets import UNITS, SnippetCondition
 
 SHORT, LONG = 10.0, 30.0
 """Windows that count: the paper's, and long enough to see drivers come back. [s]"""
@@ -18,5 +18,5 @@ def ranked_numbers(lengths: Collection[float]) -> list[tuple[SnippetCondition, s
     seconds = LONG if LONG in lengths else SHORT
     return [
         (SnippetCondition(SHORT, True), "metrics"),
-        *((SnippetCondition(seconds, False), family) for family in FAMILIES),
+        *((SnippetCondition(seconds, False), family) for family in UNITS),
     ]

@@ -41,7 +41,8 @@ TELLING = {
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
     "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
     "turns at rest": "turns",
-    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides", "rests": "move sideways",
+    "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides",
+    "rests": "move sideways|times what was sampled|are none|stays as it is",
 }  # fmt: skip
 """Words of the messages that tell a kind, by how it begins."""
 DIFFERS = "in esmini|not played"
@@ -144,7 +145,8 @@ def happens(names, a, b):
         begun = zip(then_all.get((name, RUNNING), []), now_all.get((name, RUNNING), []), strict=False)
         moved = [0.0] * len(then) if starts else [u - t for t, u in begun] + [0.0] * len(then)
         for t, u, with_start in zip(then, now, moved, strict=False):
-            if min(abs(u - t), abs(u - t - with_start)) > (LATE if starts else LATE_END):  # not as its start does
+            is_cut = not starts and (t > a["end"] - 0.02 or u > b["end"] - 0.02)  # by the end of a run, it has none
+            if not is_cut and min(abs(u - t), abs(u - t - with_start)) > (LATE if starts else LATE_END):
                 add(f"event {'starts' if starts else 'ends'} {'later' if u > t else 'earlier'}", name, t, abs(t - u))
         for t in then[len(now) :]:
             if t < ends - 0.5:
@@ -173,12 +175,8 @@ def touches(a, b):
         t, u = a["contacts"].get(pair), b["contacts"].get(pair)
         who = next((one for one in pair if one != "Ego"), "Ego")
         if t is None or u is None:
-            yield {
-                "kind": "contact is new" if t is None else "contact is lost",
-                "who": who,
-                "t": t or u or 0.0,
-                "size": 1.0,
-            }
+            kind = "contact is new" if t is None else "contact is lost"
+            yield {"kind": kind, "who": who, "t": t or u or 0.0, "size": 1.0}
         elif abs(t - u) > CONTACT:
             yield {"kind": "contact moved", "who": who, "t": t, "size": abs(t - u)}
 
@@ -216,9 +214,13 @@ def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False
     more = np.where(leaps, 0.0, strays[1] - widest(strays[0], 100))
     if more.max() > FRAME_WAY:
         yield "jumps along", source[more.argmax(), 0], more.max()
-    if shifted == np.inf and tuple(source[-1, 5:7]) != tuple(other[-1, 5:7]):
+    aside = (other[:, 2] - source[:, 2]) * np.cos(source[:, 3]) - (other[:, 1] - source[:, 1]) * np.sin(source[:, 3])
+    is_other = (source[:, 5:7] != other[:, 5:7]).any(1)  # roads of a junction lie over each other: where it is counts
+    if shifted == np.inf and is_other[-1] and abs(aside[-1]) > 0.5 * spec["road"].get("width", 3.5):
         yield "last lane is another", source[-1, 0], 1.0
-    beyond = [_beyond(spec, who, rows) for rows in (source, other)]
+    there = other.copy()
+    there[is_other, 7] = np.abs(aside[is_other]) + np.abs(source[is_other, 7])
+    beyond = [_beyond(spec, who, rows) for rows in (source, there)]
     calm = (source[:, 0] < shifted) & (widest(np.abs(np.diff(source[:, 7], prepend=source[0, 7])), 100) < 1e-4)
     past = np.where(calm & (beyond[0] <= 0.0), beyond[1], 0.0)
     if replay is not None and past.max() > SWERVE:
@@ -227,9 +229,6 @@ def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False
             yield "swerves", source[past.argmax(), 0], past.max()
     drives = (source[:, 4] > look.DRIVING_SPEED) & ~own
     if drives.sum() > 4.0 / 0.01:
-        aside = (other[:, 2] - source[:, 2]) * np.cos(source[:, 3]) - (other[:, 1] - source[:, 1]) * np.sin(
-            source[:, 3]
-        )
         width = np.ptp(sliding_window_view(aside, 200), axis=1)[sliding_window_view(drives, 200).all(1)]
         if len(width) > 200 and np.mean(width > 2.0 * look.MOVED) < 0.8:
             yield "rests beside its way", source[drives.argmax(), 0], 1.0 - float(np.mean(width > 2.0 * look.MOVED))

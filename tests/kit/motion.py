@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion, NominalMotion, PlayedAction, made_vehicle
 from xosc_lateral.world.motion.trajectory import distance_driven
@@ -13,6 +14,7 @@ from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity
 from xosc_lateral.world.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.surroundings.context import Surroundings
 
 LANE_WIDTH = 3.5
 RADIUS = 400.0
@@ -108,3 +110,8 @@ def together(*entities: EntityMotion, actions: tuple[PlayedAction, ...] = ()) ->
 
 
 __all__ = ["LANE_WIDTH", "RADIUS", "STEP", "distance_driven", "drive", "entity", "together", "two_roads"]
+
+
+def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
+    """Context of one vehicle, see `Surroundings`."""
+    return Surroundings(motion, network).context(index, grid)

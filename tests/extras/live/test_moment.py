@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.kit.motion import drive, entity, together, two_roads
+from tests.kit.motion import drive, entity, entity_context, together, two_roads
 from xosc_lateral.extras.live.moment import OpenDriveRoads, Places, give_way_now, look_around
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.scenario.enums import VehicleCategory
-from xosc_lateral.world.surroundings.context import entity_context
 from xosc_lateral.world.surroundings.give_way import Response, SampledVehicle, give_way
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from tests.kit.doors import STEP, fcd, highd, osi_trace
+from tests.kit.motion import entity_context
 from tests.kit.stage import lanes, line, map_of, road, section
 from xosc_lateral import import_drives, reconstruct
 from xosc_lateral.base.rates import rate
@@ -21,7 +22,6 @@ from xosc_lateral.extras.recordings.reconstruct import Reconstruction
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.surroundings.context import entity_context
 
 LENGTH, LANE, BEGIN, DURATION = 4.5, 3.5, 20.0, 5.0
 PEAK = 0.5 * np.pi * LANE / DURATION  # of the lateral speed [m/s]

@@ -217,7 +217,7 @@ def test_what_the_first_frame_of_the_reference_player_takes_otherwise_is_said(
         '<EntityRef entityRef="Lead"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>'
     )
     marker = maneuvers(event(by_name(), trigger=when(by_entity(inside))))
-    notes = [note for note in Stage(tmp_path).play(marker, start=start, last=1.0).motion.notes if note.entity == "Lead"]
+    notes = [note for note in Stage(tmp_path).play(marker, start=start, last=1.0).motion.notes if note.entity == "Ego"]
     assert [note.what.startswith(told) for note in notes] == [True] * bool(told)
 
 

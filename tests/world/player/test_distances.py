@@ -87,6 +87,8 @@ def test_what_is_far_need_not_be_exact_and_what_may_be_near_is(world: World, fre
         exact = distance(world, own, other, ROAD, AHEAD, freespace=freespace)
         gap = kept.to_entity(own, other, enough=enough)
         assert gap == exact if abs(exact) <= enough else abs(gap) > enough
+        amount = abs(kept.to_entity(own, other, enough=enough, near=enough))
+        assert (amount < enough, amount > enough) == (abs(exact) < enough, abs(exact) > enough)
         measured += gap == exact
     assert measured < 1500
 

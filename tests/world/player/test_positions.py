@@ -25,7 +25,11 @@ from tests.kit.stage import (
 )
 from tests.world.player.test_driving import MIRRORED, crossing
 from xosc_lateral.base.errors import PlaybackError, XoscLateralError
+from xosc_lateral.world.player.positions import resolve
 from xosc_lateral.world.player.positions.geo import ProjectionError, project
+from xosc_lateral.world.player.simulation import Simulation
+from xosc_lateral.world.scenario.place import Place
+from xosc_lateral.world.scenario.position import RelativeObjectPosition, RelativeRoadPosition
 
 REF = teleport(on_lane(-2, 100.0)) + speed(10.0)
 BEND = map_of(road("1", arc(0.01, length=300.0), 300.0))
@@ -64,6 +68,24 @@ def test_positions(tmp_path: Path, position: str, expected: tuple[float, float, 
     assert (x, y) == pytest.approx(expected[:2], abs=1e-6)
     assert np.cos(heading - expected[2]) == pytest.approx(1.0, abs=1e-12)
     assert lane == expected[3]
+
+
+def test_a_path_beside_an_entity_is_found_on_one_way_whatever_it_begins_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As reactive outputs have it: the first vertex is where the vehicle is, the others are beside its way."""
+    played = Stage(tmp_path, BEND).play(start={"Ref": REF, "Ego": REF}, last=0.1)
+    simulation, here = Simulation(played.scenario, played.network), Place("", None, "")
+    simulation.entity("Ref", here).move_to(0, -2, 100.0, 0.2)
+    places = [
+        RelativeObjectPosition("Ref", 0.0, 0.0, place=here),
+        *(RelativeRoadPosition("Ref", 3.0 * k, 0.1 * k, place=here) for k in range(1, 9)),
+    ]
+    one_by_one = [resolve.pose_of(place, simulation) for place in places]
+    asked = list[object]()
+    monkeypatch.setattr(resolve, "pose_of", lambda place, _: asked.append(place) or one_by_one[0])
+    assert np.allclose(resolve.poses_of(places, simulation), one_by_one, rtol=0.0, atol=1e-9)
+    assert asked == places[:1]
 
 
 def test_relative_to_an_entity_that_drives_against_s(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.kit.motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
+from tests.kit.motion import LANE_WIDTH, RADIUS, drive, entity, entity_context, together, two_roads
 from tests.kit.profiles import effect_from_dict
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.world.motion.nominal import EntityMotion, PlayedAction
@@ -19,7 +19,7 @@ from xosc_lateral.world.scenario.global_actions import Environment, EnvironmentA
 from xosc_lateral.world.scenario.place import Place
 from xosc_lateral.world.scenario.scenario import Action
 from xosc_lateral.world.surroundings.around import INFLUENCE_DISTANCE
-from xosc_lateral.world.surroundings.context import STEERING_DURATION, entity_context
+from xosc_lateral.world.surroundings.context import STEERING_DURATION
 
 GRID = np.arange(0, 501, 10)
 TRUCK = VehicleCategory.TRUCK

@@ -272,8 +272,7 @@ def resolved_bands(seconds: float, highest: float = float(BANDS[-1])) -> list[tu
 
 
 MINIMUM_POWER = 1e-9  # Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]
-FAMILIES = ("metrics", "lane_keeping", "spectrum", "memory")  # Kinds of difference.
-UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
+UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}  # Of each kind of difference.
 
 
 def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:

@@ -87,10 +87,10 @@ def drives(motion: NominalMotion, egos: Collection[str], network: RoadNetwork) -
 def _lane_beside(ego: EntityMotion, network: RoadNetwork) -> int:
     """Where it can change to when it does; 0: there is none."""
     row = min(int(np.searchsorted(ego.time, LANE_CHANGE_START)), len(ego.time) - 1)
-    road, lane, s = int(ego.road[row]), int(ego.lane[row]), float(ego.s[row])
+    road, lane, s, side = int(ego.road[row]), int(ego.lane[row]), float(ego.s[row]), int(np.sign(ego.lane[row]))
     there = {one.id: one.type for one in network.lanes_at(road, s)} if road >= 0 else {}
-    both = (lane + np.sign(lane) * side for side in (-1, 1))  # towards the middle of the road first
-    return next((int(one) for one in both if one and there.get(int(one)) in DRIVING), 0)
+    nearest = (lane - side, lane + side, -side)  # towards the middle of the road first, that of oncoming traffic last
+    return next((one for one in nearest if one and there.get(one) in DRIVING), 0)
 
 
 def with_speeds(

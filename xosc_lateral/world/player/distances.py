@@ -104,12 +104,11 @@ def free_road_gap(state: EntityState, other: EntityState, *, limit: float = UNRE
     return gap and replace(gap, ds=ds)
 
 
-def is_turned(state: EntityState, other: EntityState) -> bool:
-    """Whether s runs the other way on the road of another entity: +t is on the other side there."""
-    if state.road == other.road:
-        return False
-    gap = road_gap(state, spot_of(other))
-    return gap is not None and gap.is_turned
+def is_turned(state: EntityState, road: int, s: float) -> bool:
+    """Whether s runs the other way at a place on a road: +t is on the other side there. [m]"""
+    ends = (state.road, state.s), (road, s)
+    path = None if NO_ROAD in (road, state.road) or road == state.road else state.network.path_between(*ends)
+    return path is not None and path.is_turned
 
 
 def _gap_between(state: EntityState, here: Spot, spot: Spot, limit: float) -> RoadGap | None:
@@ -125,7 +124,8 @@ def _path_between(state: EntityState, here: Spot, spot: Spot, limit: float = UNR
     """The way that an entity would drive from one place to another; None: there is none."""
     if here.road == NO_ROAD or spot.road == NO_ROAD:
         return None
-    direction = 1 if state.is_forward else -1
+    # a corner may be beyond a joint of roads that run towards each other
+    direction = 1 if state.is_forward is not is_turned(state, here.road, here.s) else -1
     return state.network.path_between((here.road, here.s), (spot.road, spot.s), direction=direction, limit=limit)
 
 
@@ -140,65 +140,81 @@ class Measure(Struct, frozen=True, eq=False):
     system: CoordinateSystem
     kind: RelativeDistanceType
     freespace: bool = False
+    note: Callable[[str, EntityState], None] = lambda what, state: None  # of what esmini measures otherwise
 
     @property
     def is_along_roads(self) -> bool:
         """Whether it needs road coordinates."""
         return self.kind is not RelativeDistanceType.EUCLIDIAN and self.system in _ALONG_ROADS
 
-    def between(self, state: EntityState, target: Spot | EntityState, *, enough: float = inf) -> float:
+    def between(
+        self, state: EntityState, target: Spot | EntityState, *, enough: float = inf, near: float = -inf
+    ) -> float:
         """From an entity to a spot, or to another entity, all trailers included; `UNREACHABLE_DISTANCE` if none. [m]
 
-        `enough`: what is farther, ahead or behind, need not be exact [m]
+        `enough`: what is farther, ahead or behind, need not be exact; `near`: what is nearer, and on which side [m]
         """
-        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target, enough)
+        gap = self.to_spot(state, target) if isinstance(target, Spot) else self._to_train(state, target, enough, near)
         return UNREACHABLE_DISTANCE if gap is None else gap
 
-    def _to_train(self, state: EntityState, target: EntityState, enough: float) -> float | None:
+    def _to_train(self, state: EntityState, target: EntityState, enough: float, near: float) -> float | None:
         """Free space is that of the nearest two."""
         pairs = [(own, theirs) for own in _train(state) for theirs in _train(target)] if self.freespace else []
         if len(pairs) < 2:
-            return self.to_entity(state, target, enough=enough)
+            return self.to_entity(state, target, enough=enough, near=near)
         nearness = self if self.is_along_roads else replace(self, kind=RelativeDistanceType.EUCLIDIAN)
-        gaps = [nearness.to_entity(*pair, enough=enough) for pair in pairs]
+        gaps = [nearness.to_entity(*pair, enough=enough, near=near) for pair in pairs]
         gap, nearest = min(zip(gaps, pairs, strict=True), key=lambda each: inf if each[0] is None else abs(each[0]))
         return gap if nearness is self else self.to_entity(*nearest)
 
-    def to_entity(self, state: EntityState, other: EntityState, *, enough: float = inf) -> float | None:
-        """From one entity to another, exact up to `enough`. [m]"""
-        may_be_far = enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL
-        if may_be_far and (least := self._at_least(state, other)) > enough + MARGIN:
-            return least
+    def to_entity(
+        self, state: EntityState, other: EntityState, *, enough: float = inf, near: float = -inf
+    ) -> float | None:
+        """From one entity to another, exact from `near` to `enough`. [m]"""
+        if enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL:
+            least, most = self._bounds(state, other)
+            if least > enough + MARGIN or most < near - MARGIN:
+                return least if least > enough else most
         if not self.freespace:
-            pose = other.plane
-            gap = self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(pose.x, pose.y))
-        elif not self.is_along_roads:
+            return self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(other.plane.x, other.plane.y))
+        if not self.is_along_roads:
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
-        elif overlap(state, other):
+        if overlap(state, other):
             return 0.0
-        else:
-            gap = self._between_corners(state, [_project(state, x, y) for x, y in corners(other)])
-        return gap
+        return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
 
-    def _at_least(self, state: EntityState, other: EntityState) -> float:
-        """How far away it is at least, ahead or behind: by where both are, else from one's place on its road to the
-        other's. No road bends so much that a way is half as long along its reference line.
+    def _bounds(self, state: EntityState, other: EntityState) -> tuple[float, float]:
+        """How far away it is at least and at most, ahead or behind: by where both are, and from one's place on its road
+        to the other's, which are beside their boxes. No road bends so much that a way is half as long along its
+        reference line.
         """
         sizes = _reach(state) + _reach(other) if self.freespace else 0.0
-        least = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes
-        if least > 0.0 and self.freespace and min(_room(state), _room(other)) > 0.0:
-            path = _path_between(state, spot_of(state), spot_of(other))
+        least, most = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes, inf
+        if not self.freespace:
+            return least, most
+        rooms = min(_room(state), _room(other))
+        is_on_roads, ends = NO_ROAD not in (state.road, other.road), ((state.road, state.s), (other.road, other.s))
+        path = state.network.path_between(*ends) if is_on_roads else None
+        if path is not None and rooms > 0.0:
             stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
-            return least if path is None else max(least, abs(path.ds) - stretch * sizes)
-        return least
+            # a reference point may be beside its own box
+            boxes = (one.entity.bounding_box for one in (state, other))
+            beside = (max(abs(box.center_x) - 0.5 * box.length, abs(box.center_y) - 0.5 * box.width) for box in boxes)
+            most = abs(path.ds) + 2.0 * stretch * sum(max(gap, 0.0) for gap in beside)
+            least = max(least, abs(path.ds) - stretch * sizes)
+        elif path is None and is_on_roads:
+            what = f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest"
+            self.note(what, state)
+        return least, most
 
     def to_spot(self, state: EntityState, spot: Spot) -> float | None:
         """From an entity to a spot. [m]"""
         if self.freespace:
             if self.is_along_roads:
                 return self._between_corners(state, [spot])
-            point = spot.x, spot.y
-            return self._between_boxes(state, (point,), lambda: holds_point(corners(state), point))
+            return self._between_boxes(
+                state, ((spot.x, spot.y),), lambda: holds_point(corners(state), (spot.x, spot.y))
+            )
         if self.kind is RelativeDistanceType.EUCLIDIAN:
             return straight_distance(state, spot.x, spot.y)
         lateral = self.kind is RelativeDistanceType.LATERAL
@@ -212,9 +228,7 @@ class Measure(Struct, frozen=True, eq=False):
             ahead, left = ahead_and_left(state, spot.x, spot.y)
             return left if lateral else ahead
         gap = road_gap(state, spot)
-        if gap is None:
-            return None
-        return gap.dt if lateral else gap.ds
+        return None if gap is None else gap.dt if lateral else gap.ds
 
     def _between_boxes(self, state: EntityState, shape: tuple[Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""
@@ -226,17 +240,26 @@ class Measure(Struct, frozen=True, eq=False):
         along, across = box_gaps(ours, shape, state.network.header_offset.heading if in_world else along_own)
         return across if self.kind is RelativeDistanceType.LATERAL else along
 
-    def _between_corners(self, state: EntityState, spots: list[Spot]) -> float | None:
+    def _between_corners(self, state: EntityState, spots: list[Spot], name: str = "") -> float | None:
         """Smallest gap along (or across) the road between the projected corners; 0 where they overlap. [m]"""
         state.locate()
-        values = []
+        rows = list[list[float]]()
         for place in (_project(state, x, y) for x, y in corners(state)):
-            for spot in spots:
-                path = _path_between(state, place, spot)
-                if path is None:
-                    return None
-                values.append(_across(place, spot, path) if self.kind is RelativeDistanceType.LATERAL else path.ds)
-        return 0.0 if min(values) < 0.0 <= max(values) else min(values, key=abs)
+            paths = [(spot, _path_between(state, place, spot)) for spot in spots]
+            ways = [(spot, path) for spot, path in paths if path is not None]
+            if len(ways) < len(spots):
+                return None
+            lateral = self.kind is RelativeDistanceType.LATERAL
+            rows.append([_across(place, spot, path) if lateral else path.ds for spot, path in ways])
+        low, high = min(map(min, rows)), max(map(max, rows))
+        nearest = min((value for row in rows for value in row), key=abs)
+        # On both sides of each other, and no farther than boxes reach: ways round a ring lead to either side, too.
+        reach = 2.0 * _reach(state) + max(hypot(spot.x - spots[0].x, spot.y - spots[0].y) for spot in spots)
+        beside = low < 0.0 <= high and high - low <= 2.0 * reach
+        if name and beside is not any(min(row) < 0.0 <= max(row) for row in rows):
+            what = "beside all of" if beside else "nowhere beside"
+            self.note(f"it is {what} '{name}' along the road; in esmini, its free space is as if it were not so", state)
+        return 0.0 if beside else nearest
 
 
 def _train(state: EntityState) -> list[EntityState]:
@@ -321,13 +344,9 @@ def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
 
 def axis_gap(corners_: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> float:
     """Signed gap from `corners_` to `other` along an axis; 0 where their shadows overlap."""
-    mine = [x * axis[0] + y * axis[1] for x, y in corners_]
-    theirs = [x * axis[0] + y * axis[1] for x, y in other]
-    if max(mine) < min(theirs) - EPSILON:
-        return min(theirs) - max(mine)
-    if min(mine) > max(theirs) + EPSILON:
-        return max(theirs) - min(mine)
-    return 0.0
+    mine, theirs = ([x * axis[0] + y * axis[1] for x, y in shape] for shape in (corners_, other))
+    ahead, behind = min(theirs) - max(mine), max(theirs) - min(mine)
+    return ahead if ahead > EPSILON else behind if behind < -EPSILON else 0.0
 
 
 def overlap(a: EntityState, b: EntityState) -> bool:
@@ -343,27 +362,27 @@ def overlap(a: EntityState, b: EntityState) -> bool:
 
 def distance_between(a: tuple[Point, ...], b: tuple[Point, ...]) -> float:
     """Shortest distance between the outlines of two convex shapes that don't overlap; either may be a point."""
-    best = inf
-    for points, outline in ((a, b), (b, a)):
-        edges = list(zip(outline, outline[1:] + outline[:1], strict=True))
-        for point in points:
-            for start, end in edges:
-                ux, uy = end[0] - start[0], end[1] - start[1]
-                length = ux * ux + uy * uy
-                u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
-                u = min(max(u, 0.0), 1.0)
-                best = min(best, hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy))
-    return best
+    return min(
+        _to_edge(point, start, end)
+        for points, outline in ((a, b), (b, a))
+        for start, end in zip(outline, outline[1:] + outline[:1], strict=True)
+        for point in points
+    )
+
+
+def _to_edge(point: Point, start: Point, end: Point) -> float:
+    ux, uy = end[0] - start[0], end[1] - start[1]
+    length = ux * ux + uy * uy
+    u = 0.0 if length == 0.0 else ((point[0] - start[0]) * ux + (point[1] - start[1]) * uy) / length
+    u = min(max(u, 0.0), 1.0)
+    return hypot(point[0] - start[0] - u * ux, point[1] - start[1] - u * uy)
 
 
 def holds_point(box: tuple[Point, ...], point: Point) -> bool:
     """Whether a point is inside a box given by its corners."""
     (ax, ay), (bx, by), _, (dx, dy) = box
-    for ux, uy in ((bx - ax, by - ay), (dx - ax, dy - ay)):
-        along = (point[0] - ax) * ux + (point[1] - ay) * uy
-        if not 0.0 <= along <= ux * ux + uy * uy:
-            return False
-    return True
+    sides = (bx - ax, by - ay), (dx - ax, dy - ay)
+    return all(0.0 <= (point[0] - ax) * ux + (point[1] - ay) * uy <= ux * ux + uy * uy for ux, uy in sides)
 
 
 def box_gaps(shape_: tuple[Point, ...], shape: tuple[Point, ...], turn: float) -> tuple[float, float]:

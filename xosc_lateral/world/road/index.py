@@ -61,7 +61,7 @@ class SurfaceIndex(NetworkTables):
         inputs = [x, y, *(a for a in (z, heading) if a is not None)]
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in inputs))
         flat = [a.ravel() for a in arrays]
-        _refuse_nan(flat)
+        refuse_nan(flat)
         height = flat[2] if z is not None else None
         direction = flat[-1] if heading is not None else None
         types = None if lane_types is None else frozenset(lane_types)
@@ -84,7 +84,7 @@ class SurfaceIndex(NetworkTables):
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
         arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (x, y, s)), np.asarray(road, np.int32))
         flat = [a.ravel() for a in arrays]
-        _refuse_nan(flat[:3])
+        refuse_nan(flat[:3])
         types = None if lane_types is None else frozenset(lane_types)
         best = _Best(len(flat[0]))
         roads = flat[3].astype(np.int32)
@@ -231,8 +231,10 @@ class _Best:
         return LanePositions(road.reshape(shape), lane.reshape(shape), *(values.reshape(shape) for values in others))
 
 
-def _refuse_nan(arrays: Sequence[FloatArray]) -> None:
+def refuse_nan(arrays: list[FloatArray]) -> list[FloatArray]:
+    """Coordinates of points, if all are some."""
     for array in arrays:
         if not np.isfinite(array).all():
             i = int(np.flatnonzero(~np.isfinite(array))[0])
             raise ValueError(f"point {i}: {array[i]} is not a coordinate")
+    return arrays

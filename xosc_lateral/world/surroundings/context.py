@@ -74,11 +74,6 @@ class Surroundings:
         return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
 
 
-def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
-    """Context of one vehicle, see `Surroundings`."""
-    return Surroundings(motion, network).context(index, grid)
-
-
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
     speed = entity.speed
     if len(speed) > 1:

@@ -93,7 +93,7 @@ class RunningLaneChange(RunningToTarget):
         if reference.lane == 0 and target.value == 0:
             return 1  # no entity drives on lane 0: the lane to its left, as in the reference player
         lane = beside(reference.lane, target.value if reference.is_forward else -target.value)
-        return -lane if is_turned(self.actor, reference) else lane
+        return -lane if is_turned(self.actor, reference.road, reference.s) else lane
 
     def _move_of_frame(self, way: float, step: float) -> tuple[float, float, float]:
         """Way ahead [m], new offset [m], and heading relative to the direction of driving, positive to +t [rad]."""
@@ -210,7 +210,7 @@ class RunningLaneOffset(RunningToTarget):
         if reference is not None:
             reference.locate()
             t = reference.t + (value if reference.is_forward else -value)
-            return (-t if is_turned(state, reference) else t) - (state.t - state.offset_t)
+            return (-t if is_turned(state, reference.road, reference.s) else t) - (state.t - state.offset_t)
         if self.simulation.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
             return value * state.network.travel_direction(state.road, state.lane)
         return value

@@ -32,7 +32,12 @@ def measure_of(content: conditions.Measured | conditions.RelativeDistanceConditi
     """
     along_route = getattr(content, "along_route", None)
     system = content.coordinate_system or (CoordinateSystem.ROAD if along_route else CoordinateSystem.ENTITY)
-    measure = Measure(system, content.distance_type or RelativeDistanceType.EUCLIDIAN, content.freespace)
+    measure = Measure(
+        system,
+        content.distance_type or RelativeDistanceType.EUCLIDIAN,
+        content.freespace,
+        lambda what, state: simulation.note(what, content.place, entity=state.name),
+    )
     if measure.is_along_roads and content.routing_algorithm not in _SHORTEST_ROUTE_ALGORITHMS:
         simulation.note(
             f"routingAlgorithm '{content.routing_algorithm}': measured along the shortest way instead", content.place
@@ -47,11 +52,11 @@ def measure_of(content: conditions.Measured | conditions.RelativeDistanceConditi
 
 
 def _amount(measure: Measure, state: EntityState, target: Spot | EntityState, enough: float = inf) -> float:
-    """Never negative; exact up to `enough`. [m]"""
+    """Never negative; exact where it is `enough`. [m]"""
     if measure.kind is RelativeDistanceType.EUCLIDIAN and not measure.freespace:
         place = target.plane if isinstance(target, EntityState) else target
         return apart(state, place.x, place.y)
-    return abs(measure.between(state, target, enough=enough))
+    return abs(measure.between(state, target, enough=enough, near=enough))
 
 
 def prepare_distance(content: conditions.DistanceCondition, simulation: Simulation) -> EntityCheck:
@@ -123,7 +128,7 @@ def prepare_time_to_collision(content: conditions.TimeToCollisionCondition, simu
             if simulation.time == 0.0 and collides is not _collides(distance, as_standing, content):
                 what = "holds" if collides else "does not hold"
                 what += f" at 0 s; in esmini, for which '{target}' stands in the first frame, it is the other way round"
-                simulation.note(what, content.place, entity=target)
+                simulation.note(what, content.place, entity=state.name)
             return collides
 
         return check

@@ -64,34 +64,30 @@ def pose_of(position: positions.Position, simulation: Simulation) -> Pose:
 
 
 def poses_of(places: Sequence[positions.Position], simulation: Simulation) -> list[Pose]:
-    """World poses of many positions now; a path beside one entity is found on one way along the road."""
+    """World poses of many positions now; those in turn beside one entity are found on one way along the road."""
     poses = list[Pose]()
-    for entity, run in groupby(
-        places,
-        lambda place: (
-            place.entity_ref
-            if isinstance(place, positions.RelativeRoadPosition) and place.orientation is None
-            else None
-        ),
-    ):
-        these = [*run]
-        poses += [pose_of(one, simulation) for one in these] if entity is None else _poses_beside(these, simulation)
+    for name, some in groupby(places, _follows):
+        group = list(some)
+        poses += _poses_beside(group, simulation) if name else [pose_of(place, simulation) for place in group]
     return poses
+
+
+def _follows(place: positions.Position) -> str | None:
+    """The entity beside whose way along the road a position is, turned as the road is."""
+    return place.entity_ref if isinstance(place, positions.RelativeRoadPosition) and place.orientation is None else None
 
 
 def _poses_beside(places: Sequence[Any], simulation: Simulation) -> list[Pose]:
     """As `relative_road_position` has each."""
-    state, network, driven = entity_on_road(places[0], simulation), simulation.network, 0.0
-    scout = EntityState(state.entity, network, route=state.route)
-    scout.put(state.place._replace(pose=None))
-    way, rows = 1, list[tuple[int, float, float]]()
+    scout = _scout(entity_on_road(places[0], simulation))
+    way, driven, rows = 1, 0.0, list[tuple[int, float, float]]()
     for place in places:
         before = scout.is_forward
         travel(scout, way, place.ds - driven)
         driven, way = place.ds, way if scout.is_forward is before else -way
         rows.append((scout.road, scout.s, scout.t + place.dt))
     road, s, t = (np.array(column) for column in zip(*rows, strict=True))
-    poses = network.road_to_world(road, s, t)
+    poses = simulation.network.road_to_world(road, s, t)
     columns = (poses.x, poses.y, poses.z, poses.heading, poses.pitch, poses.roll)
     return [Pose(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
@@ -378,10 +374,16 @@ def entity_on_road(position: RelativeOnRoad, simulation: Simulation) -> EntitySt
 
 def moved_along(state: EntityState, distance: float, way: int, route: RouteGuide | None = None) -> Placement:
     """Where an entity would be after a way along the road, on `route` or else its own; `way` +1: along s. [m]"""
-    scout = EntityState(state.entity, state.network, route=route or state.route)
-    scout.put(state.place._replace(pose=None))
+    scout = _scout(state, route)
     travel(scout, way, distance)
     return scout.place
+
+
+def _scout(state: EntityState, route: RouteGuide | None = None) -> EntityState:
+    """One that can go ahead of an entity."""
+    scout = EntityState(state.entity, state.network, route=route or state.route)
+    scout.put(state.place._replace(pose=None))
+    return scout
 
 
 POSITIONS: dict[type, Callable[..., Placement]] = {
