@@ -85,7 +85,9 @@ def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv
         if "dtype" not in csv:
             csv["dtype"] = _texts_of_digits(head[layout.start :], separator)
         table = _in_parts(text, layout.start, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
-        table = table.loc[:, [name for name in table.columns if not _is_filler(str(name), table[name])]]
+        table = table.loc[
+            :, [name for name in table.columns if not (str(name).startswith("Unnamed: ") and table[name].isna().all())]
+        ]  # a separator at each line's end
         table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
 
@@ -109,11 +111,6 @@ def _in_parts(text: IO[bytes], start: int, **csv: Any) -> pd.DataFrame:
         whole: pd.DataFrame = pd.read_csv(text, **csv)
         return whole
     return pd.DataFrame({name: pd.concat(columns.pop(name), ignore_index=True) for name in list(columns)}, copy=False)
-
-
-def _is_filler(name: str, column: pd.Series) -> bool:
-    """A column without a name or a value, as a separator at the end of each line makes it."""
-    return name.startswith("Unnamed: ") and bool(column.isna().all())
 
 
 def tables_at(path: Path) -> list[Path]:

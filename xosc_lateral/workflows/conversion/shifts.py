@@ -190,7 +190,10 @@ class _Shifts:
         self._network, self._scenario = network, scenario
         self._entities = [{entity.name: entity for entity in run.entities} for run in (before, after)]
         self._ends = before.end_time, after.end_time
-        self._triggers = _triggers_of(scenario)
+        self._triggers: dict[Path, tuple[Condition, ...]] = {  # conditions that the start of each event waits for
+            at.path: (*conditions_of(at.act.start_trigger), *conditions_of(at.event.start_trigger))
+            for at in scenario.storyboard.events()
+        }
         self._starts, self._over = dict[Path, float](), dict[Path, float]()
         self._last = dict[Path, float]()  # when the last of an element's actions is over [s]
         self._of_entity = dict[str, list[float]]()
@@ -304,14 +307,6 @@ def _powers(played: PlayedAction) -> tuple[float, ...]:
 def _nearest(shift: float, causes: Sequence[float]) -> float:
     """What is left of a shift beside the cause that explains most of it. [s]"""
     return min((shift - cause for cause in causes), key=abs, default=shift)
-
-
-def _triggers_of(scenario: Scenario) -> dict[Path, tuple[Condition, ...]]:
-    """Conditions that the start of each event waits for."""
-    return {
-        at.path: (*conditions_of(at.act.start_trigger), *conditions_of(at.event.start_trigger))
-        for at in scenario.storyboard.events()
-    }
 
 
 def _other_order(then: Mapping[Key, PlayedAction], now: Mapping[Key, PlayedAction]) -> Iterator[Change]:

@@ -140,7 +140,8 @@ def rests_beside(entity: EntityMotion) -> Iterator[Finding]:
 
 def moving(entity: EntityMotion) -> tuple[FloatArray, BoolArray]:
     """Times at which a vehicle drives, none of its lateral actions running [s], and whether it moves sideways then."""
-    drives = _is_free(entity) & (np.abs(entity.speed) > DRIVING_SPEED)
+    is_free = (entity.activity & (Activity.ACTIVE | Activity.LATERAL)) == Activity.ACTIVE  # no lateral action moves it
+    drives = is_free & (np.abs(entity.speed) > DRIVING_SPEED)
     step = np.diff(entity.offset, prepend=entity.offset[:1])
     step[np.flatnonzero(np.diff(entity.lane) | np.diff(entity.road)) + 1] = 0.0
     step[entity.breaks] = 0.0
@@ -295,11 +296,6 @@ def _longer_way(entity: EntityMotion) -> FloatArray:
     )
     longer[entity.breaks] = 0.0
     return np.where((entity.activity & Activity.ACTIVE) != 0, longer, 0.0)
-
-
-def _is_free(entity: EntityMotion) -> BoolArray:
-    """Rows in which it is there, and no lateral action moves it."""
-    return np.asarray((entity.activity & (Activity.ACTIVE | Activity.LATERAL)) == Activity.ACTIVE)
 
 
 def _over_window(entity: EntityMotion, values: FloatArray) -> FloatArray:

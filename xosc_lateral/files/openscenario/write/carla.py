@@ -196,14 +196,11 @@ def _places_on_routes(losses: Losses, draft: Draft) -> None:
     for item in elements(losses.root, "RoutePosition"):
         names = [owner.get("entityRef") for owner in item.iterancestors("{*}Private")]
         starts = moving_entities(draft, {one.name: one for one in draft.motion.entities if one.name in names})
-        place = item.getparent()
-        owner = None if place is None else place.getparent()
-        if not starts or place is None or owner is None:
-            losses.element(item, "ScenarioRunner has no places on routes")
-            continue
-        remove(place)
         for start in starts.values():
-            build.world_position(owner, start.pose(0))
+            place = next(item.iterancestors("{*}Position"))
+            build.world_position(next(place.iterancestors()), start.pose(0))
+            remove(place)
+        losses.element(item, "ScenarioRunner has no places on routes")  # which is still there
 
 
 def _note_ways(losses: Losses, motion: NominalMotion, name: str) -> None:
