@@ -60,7 +60,7 @@ ROOMS = {
 
 IN_C = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "&&": "||", "||": "&&",
         "+": "-", "-": "+", "*": "/", "/": "*", "fmin": "fmax", "fmax": "fmin", "1": "2", "0": "1"}  # fmt: skip
-TOKEN_IN_C = re.compile(r"(?<= )(?:[<>]=?|[=!]=|&&|[|]{2}|[-+*/])(?= )|\b(?:fmin|fmax|[01](?:[.]0)?)\b(?![.])")
+TOKEN_IN_C = re.compile(r"(?<= )(?:[<>]=?|[=!]=|&&|[|]{2}|[-+*/])(?= )|(?<![.\w])(?:fmin|fmax|[01](?:[.]0)?)\b(?![.])")
 
 LEFT_OUT = ("Decorator", "_Is", "ExceptionReplacer")
 """Operators whose mutants fail at once, or are the same program as long as Python keeps small numbers."""
