@@ -64,6 +64,7 @@ COMBINATIONS = Limit(1_000_000, "", "combinations of parameters tried", "constra
 DISTRIBUTION_TIME = Limit(120, "s", "time to draw the parameter sets of a distribution", "100 000 take seconds")
 VARIANTS = Limit(10_000, "", "variants of one scenario", "more add no information")
 BATCH_JOBS = Limit(1_000_000, "", "outputs of one batch", "1 GB of plans; a database that large is converted in parts")
+PROVENANCE_NAMES = Limit(10_000, "", "inputs, or vehicles, of a provenance", "each is hashed; 1300 fill a job's memory")
 DECIMAL_EXPONENT = Limit(30, "", "decimal exponent of a range's numbers", "exact arithmetic writes out every digit")
 
 JOB_TIMEOUT = Limit(
