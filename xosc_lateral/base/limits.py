@@ -49,7 +49,8 @@ PROFILE_SIZE = Limit(5, "MB", "size of a driver profile", "fitted ones have less
 MODEL_ORDER = Limit(200, "", "coefficients of an autoregression", "fitted ones have 16, which is 16 s of memory")
 RESPONSE = Limit(600, "s", "lag, preview or response time of an effect", "drivers look seconds ahead and tire in hours")
 COURSE = Limit(100, "", "shifts in time of an effect's course", "fitted ones have three; each costs a row per step")
-JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
+JSON_DEPTH = Limit(64, "", "levels of nested JSON or TOML", "profiles nest 10 deep; Python's parser ends at about 1000")
+TOML_SIZE = Limit(1, "MB", "size of a file in TOML", "a mapping of a hundred columns has 10 kB; a second to read")
 XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
 XML_ATTRIBUTES = Limit(1000, "", "attributes of an XML element", "the standards' have ten; reading all is quadratic")
 

@@ -43,10 +43,9 @@ def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
         killed = stated if isinstance(stated := _stated(file).get("runs"), list) else []
         killed = [run for run in map(str, killed) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
         runs = [secrets.token_hex(RUN_DIGITS // 2), *killed][:1000]  # nobody was killed so often one after another
-        values = {"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}
         file.seek(0)
         file.truncate()
-        file.write(json.dumps(values).encode())
+        file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}).encode())
         file.flush()
         yield runs
     finally:

@@ -248,8 +248,9 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     """How today's program makes it otherwise, from what its provenance states."""
-    index = origin.variant - 1
-    made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
+    made = convert_scenario(
+        origin.scenario, output, origin.settings, variant_index=origin.variant - 1, saves=False
+    ).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
