@@ -250,6 +250,11 @@ def test_numbers_that_are_texts_are_no_numbers(profile, tmp_path, capsys):
     ("text", "what"),
     [
         ("a = " + "[" * 5000, "nested too deeply"),
+        ("a." * 64 + "b = 1", "unknown"),
+        ("a." * 65 + "b = 1", "nested too deeply"),
+        ("a." * 400_000 + "b = 1", "nested too deeply"),
+        ("#" * 999_900 + '\nseparator = ","\ndecimal = ","', "both"),
+        ("#" * 1_100_000, "size of a file in TOML: 1.1 MB, at most 1 MB"),
         ("columns = 1" + "0" * 5000, "Exceeds the limit"),
         ('separator = ","\ndecimal = ","', "both"),
         ('[roles]\nspeed = "magic"', "'magic' is none of road"),

@@ -6,16 +6,21 @@ import itertools
 import json
 import os
 import shutil
+import signal
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from examples.driver_simulator.simulator import simulate_drive
+from tests.kit.esmini_stand_in import StandIn
 from tests.kit.recordings import Case, road_file
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
+from xosc_lateral.extras.live import esmini_library
 from xosc_lateral.files.atomic import mend, temporary_files, together, write_atomically
 from xosc_lateral.files.output_paths import claim, is_own
 
@@ -29,10 +34,19 @@ def content(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def in_child(work: Callable[[], object], before: Callable[[], object] | None = None, largest: int | None = None) -> int:
-    """Do it in another process, something else before each step, or where no file is larger [byte]; its exit code."""
+def in_child(
+    work: Callable[[], object],
+    before: Callable[[], object] | None = None,
+    largest: int | None = None,
+    signalled: tuple[float, int] | None = None,
+) -> int:
+    """Do it in another process, something else before each step, or where no file is larger [byte], or until it gets a
+    signal after so long [s]; its exit code."""
     child = os.fork()
     if child:
+        if signalled is not None:
+            time.sleep(signalled[0])
+            os.kill(child, signalled[1])
         return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     code, looking = 70, False
 
@@ -71,6 +85,11 @@ VERBS = {
     "import": "import table -o {out}/o.csv {given}/drive.csv | {given}/other.csv",
     "reconstruct": "reconstruct {given}/tracks.csv --road {given}/road.xodr -o {out}/ --force --version 1.2 | 1.1",
     "copy": "profiles export -o {out}/ motorway-vehicle-1 motorway | rural",
+    "derive": "profiles derive -o {out}/o.json --mean 0.05 | 0.06",
+    "fmu": "export fmu -o {out}/o.fmu --force -p motorway | motorway-vehicle-1",
+    "live": "live esmini {given}/cut-in.xosc --player-library {given}/own.json --states {out}/o.csv --step 0.05 "
+    "--duration 3 | 4",
+    "vary": "vary {given}/cut-in.xosc -o {out}/ --like motorway --force -n 3 --seed 1 | 2",
     "add": "profiles add {given}/own.json --library {out} --force --tag day | night",
 }
 """A command whose last word has two values: of a former run, and of the one that is hindered."""
@@ -92,8 +111,17 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-AT_LENGTH = ("evaluate", "close-loop")
-"""Verbs that take seconds a run."""
+AT_LENGTH = ("evaluate", "close-loop", "derive", "fmu", "live", "vary")
+"""Verbs that take seconds a run, or write as others do."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def a_stand_in_of_esmini() -> Iterator[None]:
+    """In place of any library that is named."""
+    open_player = esmini_library.open_player
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(esmini_library, "open_player", lambda _, *words, **more: open_player(StandIn(), *words, **more))
+        yield
 
 
 @pytest.fixture(
@@ -138,6 +166,27 @@ def test_a_killed_run_leaves_the_old_output_or_the_new_one(
     for state in left:
         mend([state / name for name in new], is_own)
         assert content(state) in (old, new), state
+
+
+@pytest.mark.pages
+@pytest.mark.parametrize("verb", ["derive", "detect", "fit", "fmu", "live", "reconstruct", "vary"], indirect=True)
+def test_a_signal_at_any_time_leaves_the_old_output_or_the_new_one(verb, tmp_path: Path) -> None:
+    """After one that a program can answer nothing else is there, either."""
+    run, old, new, folder = verb
+    begin = time.monotonic()
+    assert in_child(lambda: run(shutil.copytree(folder, tmp_path / "whole" / "out"))) == 0
+    whole = time.monotonic() - begin
+    ended = []
+    for number, share in itertools.product((signal.SIGKILL, signal.SIGTERM), (0.2, 0.7)):
+        out = shutil.copytree(folder, tmp_path / f"{number} {share}" / "out")
+        ended.append(in_child(partial(run, out), signalled=(share * whole, number)))
+        assert ended[-1] in (0, -number, 128 + number)
+        if ended[-1] < 0:
+            mend([out / name for name in new], is_own)
+        assert content(out) in ([new] if ended[-1] == 0 else [old, new])
+        assert run(out) == 0
+        assert content(out) == new
+    assert -signal.SIGKILL in ended and {-signal.SIGTERM, 128 + signal.SIGTERM} & {*ended}
 
 
 @pytest.mark.pages

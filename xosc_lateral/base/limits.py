@@ -49,7 +49,8 @@ PROFILE_SIZE = Limit(5, "MB", "size of a driver profile", "fitted ones have less
 MODEL_ORDER = Limit(200, "", "coefficients of an autoregression", "fitted ones have 16, which is 16 s of memory")
 RESPONSE = Limit(600, "s", "lag, preview or response time of an effect", "drivers look seconds ahead and tire in hours")
 COURSE = Limit(100, "", "shifts in time of an effect's course", "fitted ones have three; each costs a row per step")
-JSON_DEPTH = Limit(64, "", "levels of nested JSON", "profiles nest 10 deep; Python's parser ends at about 1000")
+JSON_DEPTH = Limit(64, "", "levels of nested JSON or TOML", "profiles nest 10 deep; Python's parser ends at about 1000")
+TOML_SIZE = Limit(1, "MB", "size of a file in TOML", "a mapping of a hundred columns has 10 kB; a second to read")
 XML_TREE = Limit(750, "MB", "memory of an XML file, estimated", "a road of 25 MB fits, and reading stays below 1 GB")
 XML_ATTRIBUTES = Limit(1000, "", "attributes of an XML element", "the standards' have ten; reading all is quadratic")
 
@@ -64,6 +65,7 @@ COMBINATIONS = Limit(1_000_000, "", "combinations of parameters tried", "constra
 DISTRIBUTION_TIME = Limit(120, "s", "time to draw the parameter sets of a distribution", "100 000 take seconds")
 VARIANTS = Limit(10_000, "", "variants of one scenario", "more add no information")
 BATCH_JOBS = Limit(1_000_000, "", "outputs of one batch", "1 GB of plans; a database that large is converted in parts")
+PROVENANCE_NAMES = Limit(10_000, "", "inputs, or vehicles, of a provenance", "each is hashed; 1300 fill a job's memory")
 DECIMAL_EXPONENT = Limit(30, "", "decimal exponent of a range's numbers", "exact arithmetic writes out every digit")
 
 JOB_TIMEOUT = Limit(

@@ -181,7 +181,7 @@ def lock(descriptor: int) -> bool:
     return True
 
 
-LARGEST_PLAN = 1_000_000  # of what says which temporary files are moved where [byte]
+LARGEST_RECORD = 10_000_000  # of what one run says to the next: a plan of moves, a lock, a journal's line [byte]
 
 
 def mend(outputs: Iterable[Path], is_own: Callable[[Path], bool]) -> None:
@@ -203,7 +203,7 @@ def mend(outputs: Iterable[Path], is_own: Callable[[Path], bool]) -> None:
                     continue
                 if path.suffix == _PLAN:
                     with contextlib.suppress(ValueError, AttributeError, TypeError, RecursionError):  # half of a plan
-                        _finish(folder, json.loads(file.read(LARGEST_PLAN)), wanted, is_own)
+                        _finish(folder, json.loads(file.read(LARGEST_RECORD)), wanted, is_own)
                 path.unlink()
 
 

@@ -26,7 +26,15 @@ from pathlib import Path
 from typing import IO, Any
 
 from xosc_lateral.base.errors import FormatError, absent, names_beside
-from xosc_lateral.base.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
+from xosc_lateral.base.limits import (
+    FILE_SIZE,
+    JSON_DEPTH,
+    PACKING_RATIO,
+    TOML_SIZE,
+    UNPACKED_SIZE,
+    UNPACKED_UNASKED,
+    Limit,
+)
 from xosc_lateral.files.held import held_bytes
 
 LOG = getLogger(__name__)
@@ -85,11 +93,14 @@ def read_toml(path: Path, otherwise: str) -> dict[str, Any]:
     import tomllib
 
     try:
-        return tomllib.loads(read_source(path).data.decode("utf-8-sig"))
-    except RecursionError as error:
-        raise FormatError(f"{otherwise}: it is nested too deeply", path=path) from error
-    except ValueError as error:  # no UTF-8, no TOML, a number of thousands of digits
-        raise FormatError(f"{otherwise}: {error}", path=path) from error
+        text = read_source(path, TOML_SIZE).data.decode("utf-8-sig")
+        if any(part.count(".") > JSON_DEPTH.value for part in text.replace(",", "\n").split("\n")):
+            raise RecursionError  # a name of so many parts, for which `tomllib` takes the square of their number
+        return tomllib.loads(text)
+    except (RecursionError, ValueError) as error:  # no UTF-8, no TOML, a number of thousands of digits
+        raise FormatError(
+            f"{otherwise}: {'it is nested too deeply' if isinstance(error, RecursionError) else error}", path=path
+        ) from error
 
 
 @contextmanager

@@ -32,7 +32,10 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
 from xosc_lateral.extras.live.call import live_esmini
 from xosc_lateral.extras.live.esmini import EsminiTraffic, lateral_actions
-from xosc_lateral.extras.live.esmini_library import EsminiLibrary, ObjectState, open_player
+from xosc_lateral.extras.live.esmini_library import OBJECT_STATE, EsminiLibrary, ObjectState, open_player
+from xosc_lateral.extras.live.esmini_places import Ledger
+from xosc_lateral.extras.live.loop import SAME_DURATION, later_actions
+from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.motion.driver_clock import LARGEST_TURN_RATE
@@ -279,6 +282,28 @@ def test_a_vehicle_that_drifts_over_a_marking_stays_where_it_is(seed: int) -> No
     for name in ("T", "U"):
         own = frame[frame.name == name]
         assert np.abs(np.diff(own.y)).max() < 0.01, name
+
+
+def test_an_action_that_takes_longer_or_less_long_than_as_written_is_said() -> None:
+    """The cut-in's lane change takes 4 s."""
+    path = "Story::Act::CutInGroup::CutInManeuver::CutInEvent::CutInEventAction"
+    for over, is_said in ((4.0, False), (4.0 + 0.9 * SAME_DURATION, False), (4.0 + 1.1 * SAME_DURATION, True),
+                          (4.0 - 0.9 * SAME_DURATION, False), (4.0 - 1.1 * SAME_DURATION, True)):  # fmt: skip
+        said = later_actions(CUT_IN, {path: [(10.0, 10.0 + over)], "Story::gone": [(1.0, 9.0)]}, 18.0)
+        assert len(said) == is_said
+        for line in said:
+            assert line.startswith("lateral action 'CutInEventAction' at 10.00 s took ")
+            assert line.endswith("from where the driver was, 4.00 s without drivers")
+    assert later_actions(CUT_IN, {}, 18.0) == []
+
+
+def test_the_room_to_the_middle_of_a_road_is_that_beside_the_innermost_lane() -> None:
+    """Lanes of 3.5 m beside lane 0, two to the right and one to the left."""
+    ledger = Ledger(read_opendrive(CUT_IN.parents[1] / "tests" / "data" / "xodr" / "valid" / "straight.xodr"), print)
+    states = np.zeros(6, dtype=OBJECT_STATE)
+    states["road"], states["s"] = (7, 7, 7, 7, 7, 8), 300.0
+    states["lane"], states["t"] = (-1, -2, -1, 1, 1, -1), (-1.75, -5.0, 0.4, 1.75, -0.2, -1.75)
+    np.testing.assert_allclose(ledger.room_to_middle(states), [1.75, 5.0, -0.4, 1.75, -0.2, np.inf])
 
 
 @needs_esmini

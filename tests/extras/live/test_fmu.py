@@ -129,6 +129,12 @@ def test_what_a_driver_can_not_do_is_refused_with_a_reason_and_the_next_step_goe
         return ""
 
     assert "before the end of initialization" in step(0.0)
+    whole, truth = ("Integer", "Boolean") if is_2 else ("Int32", "Boolean")
+    for name, kind, values in (("seed", whole, (0, 7, 2**31 - 1)), ("following", truth, (False, True, False, True))):
+        for value in values:  # what is set is read back
+            getattr(one, f"set{kind}")(number[name], [value])
+            assert getattr(one, f"get{kind}")(number[name]) == [value]
+    assert getattr(one, f"get{whole}")(number["fault"]) == [0]
     if is_2:
         one.setupExperiment(startTime=30_000.0)
         one.enterInitializationMode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,14 @@ def test_nobody_and_vehicles_off_the_road_have_no_surroundings(tmp_path: Path) -
     found = look_around(roads, off, np.zeros(3), np.zeros(3, dtype=bool))
     assert np.isnan(found["curvature"][1]) and np.isnan(found["left_distance"][1])
     assert np.isfinite(found["curvature"][[0, 2]]).all()
+    cars = [
+        drive(roads.network, entity(f"v{k}"), lane=-1, start=at, duration=0.1) for k, at in enumerate((0.0, 20.0, 60.0))
+    ]
+    row = places_of(together(*cars), 0)
+    away = replace(row, road=np.array([0, -1, 0]))
+    ahead = look_around(roads, away, np.zeros(3), np.zeros(3, dtype=bool))["lead_distance"]
+    assert ahead[0] == pytest.approx(60.0 - 5.0) and not np.isfinite(ahead[1:]).any()
+    assert look_around(roads, row, np.zeros(3), np.zeros(3, dtype=bool))["lead_distance"][1] == pytest.approx(35.0)
 
 
 @pytest.mark.parametrize("rule", ["RHT", "LHT"])

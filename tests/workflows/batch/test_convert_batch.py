@@ -201,3 +201,26 @@ def test_a_result_reads_its_rows_from_the_manifest(database: Path, tmp_path: Pat
     (tmp_path / "out" / MANIFEST).unlink()
     with pytest.raises(FormatError, match=r"manifest\.parquet: is gone"):
         result.to_frame()
+
+
+def test_a_profile_for_a_name_counts_where_there_is_one_and_what_is_left_out_is_counted(tmp_path: Path) -> None:
+    """The truck of one scenario has another name; two catalogs and an output lie beside them."""
+    scenario, _ = xl.write_template("cut-in", tmp_path / "in")
+    text = scenario.read_text(encoding="utf-8")
+    scenario.with_name("other.xosc").write_text(text.replace("Truck", "Lorry"), encoding="utf-8")
+    catalog = (
+        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2024-01-01T00:00:00" description="" author=""/>'
+    )
+    for name in ("a", "b"):
+        path = scenario.with_name(f"{name}.xosc")
+        path.write_text(f'{catalog}<Catalog name="{name}"></Catalog></OpenSCENARIO>', encoding="utf-8")
+    xl.convert(scenario, scenario.with_name("made.xosc"), time_limit=1.0)
+    options = {"entity": {"Truck": "rural"}, "time_limit": 1.0}
+    made = xl.convert_many(tmp_path / "in", tmp_path / "out", workers=0, **options)
+    assert made.failed == 0
+    rows = pd.read_parquet(tmp_path / "out" / "manifest.parquet").set_index("output")
+    drivers = [json.loads(profiles) for profiles in rows.profiles[["cut-in.xosc", "other.xosc"]]]
+    assert (drivers[0]["Truck"], drivers[1]["Lorry"]) == ("rural", "motorway")
+    assert "; left out: 2 catalogs, 1 converted scenario" in str(made).splitlines()[0]
+    with pytest.raises(xl.XoscLateralError, match="Truck"):
+        xl.convert(scenario.with_name("other.xosc"), tmp_path / "one.xosc", **options)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +15,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.limits import BATCH_JOBS
+from xosc_lateral.files.atomic import LARGEST_RECORD
+from xosc_lateral.workflows.batch import manifest
+from xosc_lateral.workflows.batch.journal import Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import (
     MANIFEST,
     ManifestRow,
@@ -97,3 +103,40 @@ def test_a_manifest_of_texts_that_fill_any_memory_is_none(tmp_path: Path) -> Non
     assert (tmp_path / MANIFEST).stat().st_size < 1_000_000
     with pytest.raises(FormatError, match="not enough memory"):
         list(read_manifest(tmp_path / MANIFEST))
+
+
+def test_tables_of_a_folder_have_as_many_rows_as_a_batch_outputs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(manifest, "BATCH_JOBS", replace(BATCH_JOBS, value=10))
+    for count in (10, 11):
+        write_manifest((replace(ROW, output=f"{index}.xosc") for index in range(count)), tmp_path / MANIFEST)
+        write_timings(((str(index), Timing(1.0)) for index in range(count)), tmp_path / "t")
+        if count == 10:
+            assert len(list(read_manifest(tmp_path / MANIFEST))) == len(read_timings(tmp_path / "t")) == 10
+    for read in (lambda: list(read_manifest(tmp_path / MANIFEST)), lambda: read_timings(tmp_path / "t")):
+        with pytest.raises(FormatError, match="outputs of one batch: 11, at most 10"):
+            read()
+
+
+def test_a_line_of_a_journal_and_a_lock_have_so_many_bytes_and_no_more(tmp_path: Path) -> None:
+    path, lines = tmp_path / "j.jsonl", []
+    for size in (0, LARGEST_RECORD, LARGEST_RECORD + 1):
+        line = json.dumps({"row": replace(ROW, output=f"{size}.xosc", error="@").to_dict(), "seconds": 1.0})
+        lines.append(line.replace("@", "x" * max(size - len(line), 1)))
+    path.write_text("".join(f"{line}\n" for line in lines))
+    with Journal(tmp_path / "out", path, print) as journal:
+        assert list(journal) == ["0.xosc", f"{LARGEST_RECORD}.xosc"]
+        journal.drop()
+    path.write_bytes(b"")
+    os.truncate(path, 1 << 40)  # one line, of which nothing lies on the disk
+    with Journal(tmp_path / "out", path, print) as journal:
+        assert not list(journal)
+        journal.drop()
+    killed = [f"{number:012x}" for number in range(1500)]
+    path.write_text(json.dumps({"runs": killed}))
+    with folder_lock(path) as runs:
+        assert runs[1:] == killed[:999]
+    path.write_text("{" + " " * LARGEST_RECORD + f'"runs": ["{killed[0]}"]}}')
+    with folder_lock(path) as runs:
+        assert not runs[1:]

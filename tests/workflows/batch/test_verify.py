@@ -220,6 +220,17 @@ def test_no_record_sets_an_option_that_its_writer_does_not_state(copy: Path, nam
         ManifestRow.from_dict(pd.read_parquet(copy / "out" / MANIFEST).iloc[0].to_dict() | {name: 1})
 
 
+@pytest.mark.parametrize("name", ["inputs", "profiles"])
+def test_a_provenance_names_so_many_files_and_no_more(copy: Path, name: str) -> None:
+    output = sorted((copy / "out").rglob("*.xosc"))[0]
+    text = output.read_text("utf-8")
+    for count, kinds in ((10_000, {"input", "profile"}), (11_000, {"not ours"})):
+        facts = dict.fromkeys(map(str, range(count)), "x")
+        output.write_text(tampered(text, lambda stated, facts=facts: stated.update({name: facts})), encoding="utf-8")
+        (failing,) = xl.verify(output, fast=True).failing
+        assert {str(kind) for kind, _ in failing.problems} & kinds and len(failing.problems) in (count, 1)
+
+
 def test_content_that_is_sealed_anew_and_files_that_no_manifest_names_are_named(copy: Path) -> None:
     output, other = sorted((copy / "out").rglob("*.xosc"))[:2]
     change(output, 'value="33', 'value="34') if 'value="33' in output.read_text() else change(output, 'x="', 'x="1')
@@ -240,7 +251,8 @@ def test_an_output_and_a_folder_are_made_again_elsewhere(copy: Path, capsys: pyt
     assert not xl.reproduce(copy / "out", copy / "again").failing
     assert not xl.verify(copy / "again").failing
     again = pd.read_parquet(copy / "again" / MANIFEST)
-    assert list(again.output) == list(pd.read_parquet(copy / "out" / MANIFEST).output)
+    for column in ("output", "scenario", "inputs", "content_sha256", "settings"):
+        assert list(again[column]) == list(pd.read_parquet(copy / "out" / MANIFEST)[column]), column
     road = next((copy / "in" / output.parent.name).rglob("*.xodr"))
     change(road, "</OpenDRIVE>", "</OpenDRIVE> ")
     assert not xl.reproduce(output, copy / "same.xosc").failing, "another file, the same content"

@@ -32,8 +32,7 @@ def mark(root: etree._Element, provenance: Mapping[str, Any], summary: str) -> N
     """Write the provenance as a comment before the file header, and in short into its description."""
     header = root.find("{*}FileHeader")
     text = json.dumps(provenance, sort_keys=True, ensure_ascii=False, default=str)
-    for _ in range(2):  # no ``--`` may stand in a comment, nor may it end in a dash
-        text = text.replace("--", "-\\u002d")
+    text = text.replace("--", "-\\u002d")  # which may not stand in a comment
     comment = etree.Comment(f" {MARK}{text} ")
     comment.tail = root.text  # the white space before the first child
     root.insert(0 if header is None else root.index(header), comment)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import IO, Any, Self
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.files.atomic import lock, open_own
+from xosc_lateral.files.atomic import LARGEST_RECORD, lock, open_own
 from xosc_lateral.workflows.batch import manifest
 from xosc_lateral.workflows.batch.manifest import MANIFEST, TIMINGS, ManifestRow, Timing
 
@@ -42,11 +42,10 @@ def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
     try:
         killed = stated if isinstance(stated := _stated(file).get("runs"), list) else []
         killed = [run for run in map(str, killed) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
-        runs = [secrets.token_hex(RUN_DIGITS // 2), *killed]
-        values = {"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}
+        runs = [secrets.token_hex(RUN_DIGITS // 2), *killed][:1000]  # nobody was killed so often one after another
         file.seek(0)
         file.truncate()
-        file.write(json.dumps(values).encode())
+        file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}).encode())
         file.flush()
         yield runs
     finally:
@@ -62,7 +61,7 @@ def _stated(file: IO[bytes]) -> dict[str, Any]:
     """What a lock file says, whoever wrote it."""
     file.seek(0)
     try:
-        values = json.loads(file.read())
+        values = json.loads(file.read(LARGEST_RECORD))
     except (ValueError, RecursionError):
         values = None
     return values if isinstance(values, dict) else {}
@@ -194,7 +193,7 @@ class Journal:
     def _intact_end(self) -> int:
         """Index the lines there are; returns where the last whole one ends. [byte]"""
         end = 0
-        for line in self._file:
+        for line in iter(lambda: self._file.readline(LARGEST_RECORD), b""):
             try:
                 values = json.loads(line)
                 output, timing = ManifestRow.from_dict(values["row"]).output, Timing.of(values)

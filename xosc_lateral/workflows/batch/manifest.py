@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.limits import SMALL_PARSER_MEMORY
+from xosc_lateral.base.limits import BATCH_JOBS, SMALL_PARSER_MEMORY
 from xosc_lateral.base.memory import address_space
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import check_regular
@@ -217,10 +217,9 @@ def _read_table(path: Path) -> Iterator[dict[str, Any]]:
 
     check_regular(path)
     with foreign_errors(path, "can't be read as Parquet"), pq.ParquetFile(path) as file:
-        batches = file.iter_batches(ROW_GROUP)
-        while True:
-            with address_space(SMALL_PARSER_MEMORY.value):
-                rows = next((batch.to_pylist() for batch in batches), None)
-            if rows is None:
-                return
+        if file.metadata.num_rows > BATCH_JOBS.value:
+            raise FormatError(BATCH_JOBS.refusal(file.metadata.num_rows), path=path)
+        batches = (batch.to_pylist() for batch in file.iter_batches(ROW_GROUP))
+        following = address_space(SMALL_PARSER_MEMORY.value)(next)
+        while (rows := following(batches, None)) is not None:
             yield from rows

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NamedTuple
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError, absent, cut
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.limits import PROVENANCE_NAMES
 from xosc_lateral.base.version import BEHAVIOUR
 from xosc_lateral.files.openscenario.provenance import CONTENT_HASH_NAME, content_hash, facts_in, without_provenance
 from xosc_lateral.files.output_paths import claim, output_file, output_folder, path_below
@@ -111,8 +112,8 @@ class _Origin:
             scenario = Path(os.path.normpath(output.parent.resolve() / str(facts["scenario"])))
             settings = ConvertSettings.of_record(facts["options"], scenario.parent)
             for name in ("inputs", "profiles"):
-                if not isinstance(facts[name], dict):
-                    raise TypeError(f"{name} are no object")
+                if not isinstance(facts[name], dict) or len(facts[name]) > PROVENANCE_NAMES.value:
+                    raise TypeError(f"{name} are no object of at most {PROVENANCE_NAMES} names")
             if not all(isinstance(profile, str) for profile in (settings.profile, *settings.entity.values())):
                 raise TypeError("a profile is no text")
             variant = int(facts["variant"])
@@ -123,8 +124,12 @@ class _Origin:
             raise FormatError(what, path=output) from error
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FormatError(f"its provenance can't be read: {error}", path=output) from error
-        places = {name: getattr(search, name) for name in ("library", "allow", "road_path")}
-        return cls(facts, scenario, replace(settings, **places), variant)
+        return cls(
+            facts,
+            scenario,
+            replace(settings, library=search.library, allow=search.allow, road_path=search.road_path),
+            variant,
+        )
 
 
 ROADS_OPTION = flag("--road", kind=list[Path] | None, metavar="FOLDER",
@@ -170,8 +175,10 @@ def verify(
             if isinstance(defects, WorkerDiedError):
                 defects = [(Reason.FAILED, str(defects))]
             checked[number] = Checked(task.path, tuple(defects))
-    done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
-    return Verification(tuple(checked[number] for number, _ in tasks), done)
+    return Verification(
+        tuple(checked[number] for number, _ in tasks),
+        "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today",
+    )
 
 
 class _Task(NamedTuple):
@@ -241,8 +248,9 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     """How today's program makes it otherwise, from what its provenance states."""
-    index = origin.variant - 1
-    made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
+    made = convert_scenario(
+        origin.scenario, output, origin.settings, variant_index=origin.variant - 1, saves=False
+    ).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []
