@@ -94,19 +94,27 @@ class _Scored:
     span: Callable[[str], FloatArray]  # All that a column does alone, shape (seconds, rank), orthonormal.
     by_drive: Callable[[str], FloatArray]  # What it does with slopes of each drive's own, shape (seconds, k).
 
+    def _beside_parts(self, alone: FloatArray, margin: float) -> FloatArray:
+        return beside_parts(alone, self.dictionary, self.left, self.known, self.span, self.by_drive, margin)
+
+    @cached_property
+    def _leading(self) -> FloatArray:
+        """Scores as far as it takes to know the largest."""
+        return self._beside_parts(self.alone, 0.0)
+
     @cached_property
     def scores(self) -> FloatArray:
-        """Squared score less cost, shape (entries,); -inf: barred."""
-        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span, self.by_drive)
+        """Squared score less cost, shape (entries,), of all that may be looked at; -inf: barred."""
+        return self._beside_parts(self._leading, LIKELIHOOD_MARGIN)
 
-    @property
+    @cached_property
     def best(self) -> int:
         """Entry with the largest score."""
-        return int(np.argmax(self.scores))
+        return int(np.argmax(self._leading))
 
     def likeliest(self) -> tuple[ColumnEffect, float]:
         """Best candidate and its p-value."""
-        return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
+        return self.dictionary.timed(self.best), upper_tail(float(self._leading[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
         """Best entry of the best sets of columns, and of each single column of the very best."""

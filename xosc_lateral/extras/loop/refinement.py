@@ -19,7 +19,7 @@ from xosc_lateral.drivers.model.effects.shapes import Form
 from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
 from xosc_lateral.extras.loop.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.extras.loop.columns import Column
-from xosc_lateral.extras.loop.dictionary import beside, of_unit_variance, orthonormal
+from xosc_lateral.extras.loop.dictionary import LIKELIHOOD_MARGIN, beside, of_unit_variance, orthonormal
 from xosc_lateral.extras.loop.timeline import COARSE, Coarse
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
@@ -70,15 +70,19 @@ class Refinement:
         self._quantities.clear()  # of other columns
         self._responses.clear()
         best = Refined(effect, self.scores([effect])[0] - price, price)
-        best = self._best(best, list(self._shapes(best.effect, columns)))
+        shapes = list(self._shapes(effect, columns))
+        scores = self._priced_scores(shapes)
+        best = self._best(best, shapes, scores)
+        near = [at for at, score in enumerate(scores) if score > best.score - LIKELIHOOD_MARGIN]
         for step in LAG_STEPS:
             responses = RESPONSES if step > LAG_STEPS[-1] else FINE_RESPONSES
             distance = np.abs(np.log(np.array(responses) / max(best.effect.response_s, 0.1)))
-            near = [responses[index] for index in np.argsort(distance, kind="stable")[:5]]
+            about = [responses[index] for index in np.argsort(distance, kind="stable")[:5]]
             lags = [round(float(lag), 1) for lag in lags_about(best.effect.lag_s, 2.0 * step, step)]
-            timings = (structs.replace(best.effect, lag_s=lag, response_s=late) for lag in lags for late in near)
+            timings = (structs.replace(best.effect, lag_s=lag, response_s=late) for lag in lags for late in about)
             best = self._best(best, [(timed, best.price) for timed in timings])
-        return self._best(best, list(self._shapes(best.effect, columns)))
+        again = list(self._shapes(best.effect, columns))
+        return self._best(best, again if isinstance(effect, Product) else [again[at] for at in near])
 
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
@@ -119,10 +123,14 @@ class Refinement:
             self._responses[key] = running_sums(self._coarse, self._quantities[shape], effect.response_s)
         return means_by_second(self._responses[key], round(effect.lag_s / timeline.step))
 
-    def _best(self, best: Refined, others: Sequence[Priced]) -> Refined:
+    def _priced_scores(self, others: Sequence[Priced]) -> FloatArray:
+        scores = self.scores([effect for effect, _ in others]) if others else []
+        return np.asarray(scores) - [price for _, price in others]
+
+    def _best(self, best: Refined, others: Sequence[Priced], scores: FloatArray | None = None) -> Refined:
         if not others:
             return best
-        scores = np.asarray(self.scores([effect for effect, _ in others])) - [price for _, price in others]
+        scores = self._priced_scores(others) if scores is None else scores
         at = int(np.argmax(scores))
         return Refined(others[at][0], float(scores[at]), others[at][1]) if scores[at] > best.score else best
 
