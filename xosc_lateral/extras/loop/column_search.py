@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
+from scipy.special import chdtri
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
@@ -311,8 +312,6 @@ class ColumnSearch:
 
     def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
         """Refine the best sets of columns; the best of them, which knows what others explain as much."""
-        from scipy.stats import chi2
-
         search, candidates = self.search, scored.dictionary.candidates
         costs = {candidate.family: candidate.cost for candidate in candidates}
         refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
@@ -323,7 +322,7 @@ class ColumnSearch:
         outcomes.sort(key=lambda outcome: -outcome.score)
         parts = {(column,) for column in outcomes[0].effect.columns}
         # a second factor is a finding of its own, and has to be as sure as any; a part of a table need not be sure
-        chance = float(chi2.isf(search.levels[self.kind.component], 1)) if search.wanted is None else 0.0
+        chance = float(chdtri(1, search.levels[self.kind.component])) if search.wanted is None else 0.0
         simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
         best = simpler[0] if simpler else outcomes[0]
         self._simplified.extend([] if best is outcomes[0] else [best.effect.columns])
