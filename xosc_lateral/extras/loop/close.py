@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
@@ -207,10 +207,7 @@ def close_loop(
     )
 
 
-T = TypeVar("T")
-
-
-def _closing(faults: list[Rejected], what: str, say: Callable[[], T], instead: T) -> T:
+def _closing(faults: list[Rejected], what: str, say: Callable[[], Any], instead: Any) -> Any:
     """A closing word; one that fails stands among what was rejected, and costs no finding."""
     try:
         return say()

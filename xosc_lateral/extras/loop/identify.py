@@ -176,7 +176,7 @@ def _worst_first(identified: Identified) -> Identified:
         terms = [one.term for one in identified.selection.accepted]
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
         nested = identified.nested.only(terms)
-        gains = [nested.of(term) if term.predictable else None for term in terms]
+        gains = [nested.of(term) if term.predictable(identified.selection.final) else None for term in terms]
         identified = replace(identified, nested=nested)
         fallen = [(gain.mean, term) for term, gain in zip(terms, gains, strict=True) if gain and not gain.stands]
         if fallen:

@@ -165,8 +165,9 @@ def meaning(finding: Finding) -> str:
             f"{sentence[0].upper()}{sentence[1:]}.",
             *([usual] if whole_drives and finding.passage is None else []),
             f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
-            f"On stretches that nothing was fitted to, the profile was {_mm(finding.error_before)} off before, and is "
-            f"{_mm(finding.error_after)} off now ({compared}).",
+            "On stretches that nothing was fitted to, the profile was "
+            f"{1e3 * finding.error_before:.0f}{GAP}mm off before, and is {1e3 * finding.error_after:.0f}{GAP}mm off "
+            f"now ({compared}).",
         ]
     )
 
@@ -260,10 +261,6 @@ def verdict(result: LoopResult) -> str:
     )
     unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
     return f"{words} {unseen} {shown_words(result.shown)}"
-
-
-def _mm(value: float) -> str:
-    return f"{1000.0 * value:.0f}{GAP}mm"
 
 
 # ---- what drives can show ----
