@@ -29,16 +29,12 @@ MOVEMENTS = (
     "ornstein_uhlenbeck", "heavy_tailed", "reflected", "delayed_control", "clustered", "bursts", "lopsided", "pursuit",
     "oscillating", "sawtooth", "long_memory", "free_play", "zigzag", "rate_limited", "in_regimes",
 )  # fmt: skip
+# Columns that nobody responds to, and one that follows from the movement; by what a number has to differ, of the mean
+# in metres, else the logarithm.
 BAITS = ("speed", "phone_ringing", "heart_rate", "fan_level", "gps_accuracy", "lane_departure_warning")
-"""Columns that nobody responds to, and one that follows from the movement."""
 LIKE = {"mean": 0.1, "spread": 0.25, "lateral speed": 0.25, "far": 0.25}
-"""By which a number has to differ: of the mean in metres, else the logarithm."""
-LASTS = (300, 600, 900, 1500)
-"""Drives whose causes are sought. [s]"""
-FARTHEST = 2.4
-"""From the centre of a lane of 3.6 m. [m]"""
-SURE = 5.0
-"""Standard errors, of drives and samples together."""
+LASTS = (300, 600, 900, 1500)  # Drives whose causes are sought. [s]
+FARTHEST, SURE = 2.4, 5.0  # From the centre of a lane of 3.6 m [m]; standard errors, of drives and samples together.
 
 
 def numbers(offset: np.ndarray, step: float) -> list[float]:
@@ -129,9 +125,8 @@ def closed(spec: Spec) -> list[Finding]:
         return []
     made = xl.close_loop(table, seed=1)
     findings = made._result.findings
-    act = preview_driver.kinds()[spec["kind"]]
+    act, columns = preview_driver.kinds()[spec["kind"]], set[str]()
     right, out = {"curvature", *act.columns}, list[Finding]()
-    columns = set[str]()
     for one in findings:
         columns |= set(one.columns)
         # a car runs wide in bends by its speed

@@ -120,8 +120,7 @@ def fit_population(
         effects = beside_effects(runs, beside)
     else:
         effects = fit_context_effects(runs, neighbours=neighbours)
-    alone = without_effects(runs, effects)
-    profile = fit_runs(alone, name=name, model=model, provenance=provenance, fit_core=fit_core)
+    profile = fit_runs(without_effects(runs, effects), name=name, model=model, provenance=provenance, fit_core=fit_core)
     return replace(profile, sensor=sensor, effects=effects, beside=beside)
 
 

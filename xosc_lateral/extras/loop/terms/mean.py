@@ -94,8 +94,8 @@ class MeanTerm(SearchedTerm):
             return described
         if slopes.there:
             effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
-            known = np.sqrt(np.diag(fitted.covariance)[fitted.mean_part(self)])
-            wider = float(np.max(effect.errors / np.maximum(known, 1e-300)))  # as its timing and shape leave it open
+            # as its timing and shape leave it open
+            wider = float(np.max(effect.errors / np.sqrt(np.diag(fitted.covariance)[fitted.mean_part(self)])))
             size, error = described.size_m * slopes.size_there, wider * abs(described.size_m) * slopes.error_there
             described = replace(described, size_m=size, size_error=error)
         return replace(described, own_slopes=slopes)

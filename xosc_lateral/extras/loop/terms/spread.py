@@ -10,7 +10,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -86,8 +86,7 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
     key = (what_a_column_may_do, fitted.terms)
     if key not in search.tested:
         search.tested[key] = ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
-    response: tuple[FloatArray, float] = search.tested[key]
-    return response
+    return cast(tuple[FloatArray, float], search.tested[key])
 
 
 @dataclass(frozen=True, eq=False)
