@@ -115,11 +115,8 @@ def fit_population(
     Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`,
     for `fit_core` see `fit_runs`.
     """
-    few, beside = len({run.drive for run in runs}) < LEAST_DRIVES, measure_beside(runs)
-    if few and neighbours is not False and beside:
-        effects = beside_effects(runs, beside)
-    else:
-        effects = fit_context_effects(runs, neighbours=neighbours)
+    few, beside = len({run.drive for run in runs}) < LEAST_DRIVES and neighbours is not False, measure_beside(runs)
+    effects = beside_effects(runs, beside) if few and beside else fit_context_effects(runs, neighbours=neighbours)
     profile = fit_runs(without_effects(runs, effects), name=name, model=model, provenance=provenance, fit_core=fit_core)
     return replace(profile, sensor=sensor, effects=effects, beside=beside)
 
@@ -134,7 +131,7 @@ def fit_runs(
 ) -> DriverProfile:
     """Fit a profile to runs that are cut already, by the model's own fit or `fit_core`; its provenance says on what."""
     core = (fit_core or model_named(model).fit)([run.rel_offset for run in runs], [run.drive for run in runs])
-    known, step = provenance or Provenance(), core.step
+    known, step, widths = provenance or Provenance(), core.step, np.concatenate([run.lane_width for run in runs])
     known = replace(
         known,
         hours=round(sum(map(len, runs)) * step / 3600.0, 4),
@@ -143,8 +140,7 @@ def fit_runs(
         fit={**known.fit, "model": core.kind, "step_s": step, "sizes": sizes_of_runs(runs, step).to_dict()},
         package_version=__version__,
     )
-    width = float(np.median(np.concatenate([run.lane_width for run in runs])))
-    return DriverProfile(name=name, model=core, lane_width=width, provenance=known)
+    return DriverProfile(name=name, model=core, lane_width=float(np.median(widths)), provenance=known)
 
 
 # ---- The driver's part of measured runs ----

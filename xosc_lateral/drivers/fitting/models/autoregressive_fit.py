@@ -153,8 +153,8 @@ def fit_autoregressive(
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
     model = matched(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))), runs, settings)
     length = round(settings.snippet / settings.step) + 1
-    drivers = round(settings.effort * SIMULATED_DRIVERS)
-    model = with_bursts(model, runs, drives, lambda made: _drives_of(made, length, settings.seed, drivers))
+    few = round(settings.effort * SIMULATED_DRIVERS)
+    model = with_bursts(model, runs, drives, lambda made: _drives_of(made, length, settings.seed, few))
     return rounded(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))))
 
 
@@ -234,11 +234,12 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
     )
     target, window = _moments(real), window_of(runs, settings.compared_windows, settings)
     spectrum = _log_spectrum(runs, window)
-    usual = min(max(FOR_EACH * len(real) // SNIPPETS_EACH, SIMULATED_DRIVERS), MOST_SIMULATED)
-    few, many = (round(settings.effort * drivers) for drivers in (SIMULATED_DRIVERS, usual))
+    many = min(max(FOR_EACH * len(real) // SNIPPETS_EACH, SIMULATED_DRIVERS), MOST_SIMULATED)
     slopes: FloatArray | None = None
     for left in reversed(range(settings.rounds)):
-        simulated = _drives_of(model, length, settings.seed, few if left else many)
+        simulated = _drives_of(
+            model, length, settings.seed, round(settings.effort * (SIMULATED_DRIVERS if left else many))
+        )
         lacks, moments = spectrum - _log_spectrum([simulated], window), _moments(simulated.reshape(-1, length))
         if slopes is None:
             nudged = _drives_of(_volatile(model, VARIANCE_NUDGE, VARIANCE_NUDGE), length, settings.seed, len(simulated))
