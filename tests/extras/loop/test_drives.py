@@ -208,6 +208,8 @@ def test_what_acts_in_some_drives_is_named_with_them_and_the_size_that_it_has_th
     assert len(told.own_slopes.there) <= 4
     reach = np.subtract(*np.quantile(coarse.context["x"], [0.95, 0.05]))
     assert told.size_m == pytest.approx(0.15 * reach, rel=0.25)
+    assert abs(told.size_m - 0.15 * reach) < 2.0 * told.size_error < 0.3 * reach
+    assert not found.term.predictable(fitted)  # so no held-out drive is a veto: each has a slope of its own
     assert fitted.effects_of(found.term)[0].between_drivers[0] > 0.02  # type: ignore[attr-defined]
 
 

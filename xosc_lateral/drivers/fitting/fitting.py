@@ -35,7 +35,7 @@ from xosc_lateral.drivers.fitting.sensor.periodogram import (
 )
 from xosc_lateral.drivers.fitting.sensor.separation import separate
 from xosc_lateral.drivers.model.core.base import ModelKind
-from xosc_lateral.drivers.model.core.registry import model_named
+from xosc_lateral.drivers.model.core.registry import FitCore, model_named
 from xosc_lateral.drivers.model.plausibility import ACCELERATION_LIMIT, JERK_LIMIT, comfort, strain
 from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sampling import sample_offsets
@@ -108,17 +108,16 @@ def fit_population(
     provenance: Provenance | None = None,
     sensor: SensorModel | None = None,
     neighbours: bool | None = None,
+    fit_core: FitCore | None = None,
 ) -> DriverProfile:
     """Fit a profile to the driver's part of runs: what class, lane, speed and neighbours do first, then the drivers.
 
-    Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`.
+    Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`,
+    for `fit_core` see `fit_runs`.
     """
-    few, beside = len({run.drive for run in runs}) < LEAST_DRIVES, measure_beside(runs)
-    if few and neighbours is not False and beside:
-        effects = beside_effects(runs, beside)
-    else:
-        effects = fit_context_effects(runs, neighbours=neighbours)
-    profile = fit_runs(without_effects(runs, effects), name=name, model=model, provenance=provenance)
+    few, beside = len({run.drive for run in runs}) < LEAST_DRIVES and neighbours is not False, measure_beside(runs)
+    effects = beside_effects(runs, beside) if few and beside else fit_context_effects(runs, neighbours=neighbours)
+    profile = fit_runs(without_effects(runs, effects), name=name, model=model, provenance=provenance, fit_core=fit_core)
     return replace(profile, sensor=sensor, effects=effects, beside=beside)
 
 
@@ -128,10 +127,11 @@ def fit_runs(
     name: str,
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
+    fit_core: FitCore | None = None,
 ) -> DriverProfile:
-    """Fit a profile to runs that are cut already; its provenance says on what and how."""
-    core = model_named(model).fit([run.rel_offset for run in runs], [run.drive for run in runs])
-    known, step = provenance or Provenance(), core.step
+    """Fit a profile to runs that are cut already, by the model's own fit or `fit_core`; its provenance says on what."""
+    core = (fit_core or model_named(model).fit)([run.rel_offset for run in runs], [run.drive for run in runs])
+    known, step, widths = provenance or Provenance(), core.step, np.concatenate([run.lane_width for run in runs])
     known = replace(
         known,
         hours=round(sum(map(len, runs)) * step / 3600.0, 4),
@@ -140,8 +140,7 @@ def fit_runs(
         fit={**known.fit, "model": core.kind, "step_s": step, "sizes": sizes_of_runs(runs, step).to_dict()},
         package_version=__version__,
     )
-    width = float(np.median(np.concatenate([run.lane_width for run in runs])))
-    return DriverProfile(name=name, model=core, lane_width=width, provenance=known)
+    return DriverProfile(name=name, model=core, lane_width=float(np.median(widths)), provenance=known)
 
 
 # ---- The driver's part of measured runs ----

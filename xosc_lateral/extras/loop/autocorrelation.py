@@ -242,18 +242,21 @@ class Whitener:
         """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k); `filtered`:
         what the process's polynomial makes of them amid runs."""
         columns = values[:, None] if values.ndim == 1 else values
-        scaled = columns / self.scale[:, None].astype(columns.dtype)
-        start = self.process.start.astype(columns.dtype)
-        if not self.runs:
-            scaled = np.where(self.valid[:, None], scaled, 0.0)
-        result = moving_sum(self.process.polynomial, scaled) if filtered is None else filtered / self.scale[:, None]
+        scale, start = (own.astype(columns.dtype) for own in (self.scale[:, None], self.process.start))
+        if filtered is None:
+            scaled = columns / scale
+            filtered = moving_sum(
+                self.process.polynomial, scaled if self.runs else np.where(self.valid[:, None], scaled, 0.0)
+            )
+        else:
+            filtered = filtered / scale
         for run in self._runs:
-            stop = min(run.stop, run.start + self.process.order)
-            known = stop - run.start
-            result[run.start : stop] = start[:known, :known] @ scaled[run.start : stop]
+            first = slice(run.start, min(run.stop, run.start + self.process.order))
+            known = first.stop - first.start
+            filtered[first] = start[:known, :known] @ (columns[first] / scale[first])
         if not self.runs:
-            result[~self.valid] = 0.0
-        return np.asarray(result.reshape(values.shape))
+            filtered[~self.valid] = 0.0
+        return np.asarray(filtered.reshape(values.shape))
 
     def levels(self, values: FloatArray) -> FloatArray:
         """Level of every drive by generalised least squares, shape (drives,). [m]"""

@@ -71,6 +71,7 @@ def close_loop(
     from dataclasses import replace
 
     from msgspec.structs import replace as with_fields
+    from threadpoolctl import threadpool_limits
 
     from xosc_lateral.drivers.model.profile import Provenance
     from xosc_lateral.extras.loop import close
@@ -78,7 +79,8 @@ def close_loop(
     base = None if profile is None else given_profile(profile, library)
     inputs = given_drives(drives, columns)
     fitted_on = set() if base is None else set(base.provenance.inputs.values())
-    with naming(inputs):
+    # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
+    with naming(inputs), threadpool_limits(1, user_api="blas"):
         result = close.close_loop(
             inputs.drives,
             base,
@@ -119,11 +121,13 @@ def plan_loop(
     FormatError
         A role that there is not, or of a column that the drives lack.
     """
+    from threadpoolctl import threadpool_limits
+
     from xosc_lateral.extras.loop import close
 
     inputs = given_drives(drives, columns)
     known_roles = _roles_of(inputs, columns, roles)
-    with naming(inputs):
+    with naming(inputs), threadpool_limits(1, user_api="blas"):
         shown = close.plan_loop(inputs.drives, seed=seed, excluded=list(leave_out), roles=known_roles)
     return LoopPlan(shown)
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Drive
@@ -69,12 +70,10 @@ def describe_finding(
 
 def agreeing(described: Description, kind: str, p_value: float) -> Description:
     """Where a p-value below 0.001 stands beside an interval across no effect, the error that the test says [1]_."""
-    from scipy.stats import norm
-
     away = abs(described.size_m - (1.0 if kind in ("scale", "regime") else 0.0))
     if p_value >= CLEAR_P or NORMAL_95 * described.size_error < away:
         return described
-    return replace(described, size_error=away / float(norm.isf(0.5 * p_value)))
+    return replace(described, size_error=-away / float(ndtri(0.5 * p_value)))
 
 
 # The held-out error of a profile with more effects may be so many times the base's, 24 runs leave 2 % of noise; or more
@@ -208,10 +207,7 @@ def close_loop(
     )
 
 
-T = TypeVar("T")
-
-
-def _closing(faults: list[Rejected], what: str, say: Callable[[], T], instead: T) -> T:
+def _closing(faults: list[Rejected], what: str, say: Callable[[], Any], instead: Any) -> Any:
     """A closing word; one that fails stands among what was rejected, and costs no finding."""
     try:
         return say()

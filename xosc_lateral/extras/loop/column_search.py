@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 
 import numpy as np
+from scipy.special import chdtri
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
@@ -94,19 +95,27 @@ class _Scored:
     span: Callable[[str], FloatArray]  # All that a column does alone, shape (seconds, rank), orthonormal.
     by_drive: Callable[[str], FloatArray]  # What it does with slopes of each drive's own, shape (seconds, k).
 
+    def _beside_parts(self, alone: FloatArray, margin: float) -> FloatArray:
+        return beside_parts(alone, self.dictionary, self.left, self.known, self.span, self.by_drive, margin)
+
+    @cached_property
+    def _leading(self) -> FloatArray:
+        """Scores as far as it takes to know the largest."""
+        return self._beside_parts(self.alone, 0.0)
+
     @cached_property
     def scores(self) -> FloatArray:
-        """Squared score less cost, shape (entries,); -inf: barred."""
-        return beside_parts(self.alone, self.dictionary, self.left, self.known, self.span, self.by_drive)
+        """Squared score less cost, shape (entries,), of all that may be looked at; -inf: barred."""
+        return self._beside_parts(self._leading, LIKELIHOOD_MARGIN)
 
-    @property
+    @cached_property
     def best(self) -> int:
         """Entry with the largest score."""
-        return int(np.argmax(self.scores))
+        return int(np.argmax(self._leading))
 
     def likeliest(self) -> tuple[ColumnEffect, float]:
         """Best candidate and its p-value."""
-        return self.dictionary.timed(self.best), upper_tail(float(self.scores[self.best]), self.maxima)
+        return self.dictionary.timed(self.best), upper_tail(float(self._leading[self.best]), self.maxima)
 
     def contenders(self) -> list[int]:
         """Best entry of the best sets of columns, and of each single column of the very best."""
@@ -303,8 +312,6 @@ class ColumnSearch:
 
     def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
         """Refine the best sets of columns; the best of them, which knows what others explain as much."""
-        from scipy.stats import chi2
-
         search, candidates = self.search, scored.dictionary.candidates
         costs = {candidate.family: candidate.cost for candidate in candidates}
         refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
@@ -315,7 +322,7 @@ class ColumnSearch:
         outcomes.sort(key=lambda outcome: -outcome.score)
         parts = {(column,) for column in outcomes[0].effect.columns}
         # a second factor is a finding of its own, and has to be as sure as any; a part of a table need not be sure
-        chance = float(chi2.isf(search.levels[self.kind.component], 1)) if search.wanted is None else 0.0
+        chance = float(chdtri(1, search.levels[self.kind.component])) if search.wanted is None else 0.0
         simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
         best = simpler[0] if simpler else outcomes[0]
         self._simplified.extend([] if best is outcomes[0] else [best.effect.columns])

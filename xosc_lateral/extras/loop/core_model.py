@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import fdtrc
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -58,8 +59,6 @@ class SpectrumShape:
 
 def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np.random.SeedSequence) -> SpectrumShape:
     """Compare a profile's free runs with the drives, block by block."""
-    from scipy.stats import f
-
     runs = simulated_runs(profile, timeline, child(seed, LoopSeed.SPECTRUM), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
     sampled = np.concatenate([_shapes(run, timeline) for run in runs])
@@ -69,7 +68,7 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
     covariance = np.cov(real.T) / len(real) + np.cov(sampled.T) / len(sampled)
     k, n = len(difference), len(real)
     statistic = float(difference @ np.linalg.pinv(covariance) @ difference)
-    p_value = float(f.sf(statistic * (n - k) / (k * (n - 1)), k, n - k))
+    p_value = float(fdtrc(k, n - k, statistic * (n - k) / (k * (n - 1))))
     return SpectrumShape(TIMES_S, np.exp(difference), max(p_value, MINIMUM_P))
 
 
@@ -127,9 +126,7 @@ def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
 
 def _scatter(halves: FloatArray) -> tuple[float, float]:
     """Standard deviation between drives without the noise, and the F test's probability; halves: shape (drives, 2)."""
-    from scipy.stats import f
-
     between = float(np.var(halves.mean(axis=1), ddof=1))
     within = float(np.mean((halves[:, 0] - halves[:, 1]) ** 2)) / 4.0
-    p_value = float(f.sf(between / max(within, 1e-30), len(halves) - 1, len(halves)))
+    p_value = float(fdtrc(len(halves) - 1, len(halves), between / max(within, 1e-30)))
     return float(np.sqrt(max(between - within, 0.0))), p_value

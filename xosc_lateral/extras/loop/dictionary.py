@@ -222,9 +222,11 @@ def beside_parts(
     known: FloatArray,
     spans: Callable[[str], FloatArray],
     by_drive: Callable[[str], FloatArray],
+    margin: float = LIKELIHOOD_MARGIN,
 ) -> FloatArray:
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components. None
-    that explains less than slopes of each drive's own (`by_drive`) would: it would stand for which drive it is."""
+    that explains less than slopes of each drive's own (`by_drive`) would: it would stand for which drive it is. What is
+    below the best by more than a `margin` stays as it is."""
     members: dict[tuple[str, ...], list[int]] = {}
     for index in np.flatnonzero(np.isfinite(scores)):
         candidate = dictionary.candidates[index]
@@ -232,7 +234,7 @@ def beside_parts(
             members.setdefault(candidate.columns, []).append(int(index))
     scores, best = scores.copy(), {pair: float(scores[entries].max()) for pair, entries in members.items()}
     for pair in sorted(members, key=best.__getitem__, reverse=True):
-        if best[pair] < float(scores.max()) - LIKELIHOOD_MARGIN:
+        if best[pair] < float(scores.max()) - margin:
             break
         entries = members[pair]
         span = orthonormal(np.concatenate([known, *(spans(column) for column in pair)], axis=1), CROSS_BASIS)

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import fdtrc, ndtri, stdtr, stdtrit
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.extras.loop.dictionary import beside
@@ -51,22 +52,16 @@ class Pooled:
     @property
     def p_value(self) -> float:
         """Two-sided, of no such mean. [-]"""
-        from scipy.stats import t
-
-        return max(2.0 * float(t.sf(abs(self.size) / max(self.error, 1e-300), self.degrees)), MINIMUM_P)
+        return max(2.0 * float(stdtr(self.degrees, -abs(self.size) / max(self.error, 1e-300))), MINIMUM_P)
 
     def detectable_size(self, level: float) -> float:
         """Size that is found with 80 % probability at a level, in the size's unit."""
-        from scipy.stats import t
-
-        return self.error * float(t.isf(0.5 * level, self.degrees) + t.isf(0.2, self.degrees))
+        return -self.error * float(stdtrit(self.degrees, 0.5 * level) + stdtrit(self.degrees, 0.2))
 
     @property
     def bound(self) -> float:
         """What a size that was not found is below, at 95 %."""
-        from scipy.stats import t
-
-        return abs(self.size) + self.error * float(t.isf(0.05, self.degrees))
+        return abs(self.size) - self.error * float(stdtrit(self.degrees, 0.05))
 
 
 def counted(coarse: Coarse) -> FloatArray:
@@ -84,8 +79,6 @@ def own_time(coarse: Coarse) -> FloatArray:
 
 def slope_alike(rows: FloatArray, column: FloatArray, coarse: Coarse, inflation: float) -> Pooled | None:
     """Common slope of white rows on a white column, shape (n,), each less its drive's level; None: too few drives."""
-    from scipy.stats import f
-
     lasting = counted(coarse) > 0.0
     power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)[lasting]
     slopes = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[lasting] / np.maximum(power, 1e-300)
@@ -95,7 +88,7 @@ def slope_alike(rows: FloatArray, column: FloatArray, coarse: Coarse, inflation:
     scatter = float(power @ np.square(slopes - mean))
     degrees = PRIOR_DRIVES + number - 1
     error = float(np.sqrt((PRIOR_DRIVES * inflation + scatter) / degrees / power.sum()))
-    within = max(float(f.sf(power @ np.square(slopes) / number / inflation, number, PRIOR_DRIVES)), MINIMUM_P)
+    within = max(float(fdtrc(number, PRIOR_DRIVES, power @ np.square(slopes) / number / inflation)), MINIMUM_P)
     return Pooled(mean, error, degrees, number, within)
 
 
@@ -158,8 +151,6 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
     What slopes scatter by though all are alike is what their minutes show (a clustered error; Liang, Zeger 1986), as
     many as would tell as much if all moved the driver alike.
     """
-    from scipy.stats import f, norm
-
     power = np.bincount(coarse.drive, path**2, minlength=coarse.drives)
     lasting = (counted(coarse) > 0.0) & (power > LEAST_SHARE * power.sum() / coarse.drives)
     number, inside = int(lasting.sum()), lasting[coarse.drive] & coarse.valid
@@ -173,9 +164,9 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
     variance = max(float(left @ left) / float(weight.sum()) * minutes / (minutes - number), 1e-300)
     mean, noise = float(weight @ slopes / weight.sum()), variance / weight
     scatter = float(weight @ np.square(slopes - mean)) / variance
-    p_value = max(float(f.sf(scatter / (number - 1), number - 1, minutes - number)), MINIMUM_P)
+    p_value = max(float(fdtrc(number - 1, minutes - number, scatter / (number - 1))), MINIMUM_P)
     between = max(float((1.0 / weights_between(slopes, noise, np.ones((number, 1))) - noise).mean()), 0.0)
-    sure = np.sign(mean) * slopes > float(norm.isf(SURE_LEVEL / number)) * np.sqrt(noise)
+    sure = np.sign(mean) * slopes > -float(ndtri(SURE_LEVEL / number)) * np.sqrt(noise)
     known = between / np.maximum(between + noise, 1e-300)  # share of its slope that a drive knows itself
     likely, scale = mean + known * (slopes - mean), max(abs(mean), 1e-300)
     size = float(likely[sure].mean()) if sure.any() else mean

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,18 +52,6 @@ class GriddedDrive:
     def __len__(self) -> int:
         return len(self.time)
 
-    def padded(self, before: int, after: int, time: FloatArray) -> GriddedDrive:
-        """With so many more rows, in which nothing is valid and context holds; `time` is the whole new one. [s]"""
-        pads = (before, after)
-        return replace(
-            self,
-            time=time,
-            offset=np.pad(self.offset, pads),
-            valid=np.pad(self.valid, pads),
-            lane_width=np.pad(self.lane_width, pads, mode="edge"),
-            context={name: np.pad(values, pads, mode="edge") for name, values in self.context.items()},
-        )
-
 
 def grid_drives(
     drives: Sequence[Drive], rules: CutRules, *, pad: int, multiple: int
@@ -76,20 +64,19 @@ def grid_drives(
     from scipy.fft import next_fast_len
 
     periods = circular_columns(drives)
-    cut = [(drive, cut_runs(drive, rules)) for drive in drives]
-    kept = []
-    for drive, runs in cut:
-        if runs:
-            part = _gridded(drive, runs, frozenset(periods))
-            rows = -(-(len(part) + 2 * pad) // multiple) * multiple
-            time = part.time[0] + STEP * (np.arange(rows) - pad)
-            kept.append(part.padded(pad, rows - len(part) - pad, time))
-    if kept:
-        last, total = kept[-1], sum(map(len, kept))
-        more = multiple * next_fast_len(total // multiple, real=True) - total
-        later = last.time[-1] + STEP * np.arange(1, more + 1)
-        kept[-1] = last.padded(0, more, np.concatenate([last.time, later]))
-    return kept, periods
+    cut = [
+        (drive, runs, grid_of(drive, slice(0, len(drive)), STEP))
+        for drive in drives
+        if (runs := cut_runs(drive, rules))
+    ]
+    rows = [-(-(len(grid) + 2 * pad) // multiple) * multiple for _, _, grid in cut]
+    if rows:
+        rows[-1] += multiple * next_fast_len(sum(rows) // multiple, real=True) - sum(rows)
+    held = frozenset(periods)
+    return [
+        _gridded(drive, runs, grid, held, (pad, number - len(grid) - pad))
+        for (drive, runs, grid), number in zip(cut, rows, strict=True)
+    ], periods
 
 
 def circular_columns(drives: Sequence[Drive]) -> dict[str, float]:
@@ -100,17 +87,27 @@ def circular_columns(drives: Sequence[Drive]) -> dict[str, float]:
     return {name: period for name, period in periods.items() if period > 0.0}
 
 
-def _gridded(drive: Drive, runs: Sequence[Run], circular: frozenset[str]) -> GriddedDrive:
-    grid = grid_of(drive, slice(0, len(drive)), STEP)
+def _gridded(
+    drive: Drive, runs: Sequence[Run], grid: FloatArray, circular: frozenset[str], pads: tuple[int, int]
+) -> GriddedDrive:
+    """On its grid, with so many more rows before and after it."""
     offset, valid = np.zeros(len(grid)), np.zeros(len(grid), dtype=np.bool_)
     for run in runs:
         first = round((run.time[0] - grid[0]) / STEP)
         rows = slice(first, first + len(run))
         offset[rows], valid[rows] = run.offset, True
     held = drive.levels | circular
-    context = {
-        name: nearest(drive.time, values, grid) if name in held else in_digits(average(drive.time, values, grid))
-        for name, values in drive.context.items()
-    }
-    lane_width = in_digits(average(drive.time, drive.lane_width, grid))
-    return GriddedDrive(drive.name, grid, offset, valid, lane_width, context, drive.levels)
+
+    def column(values: FloatArray, *, as_is: bool) -> FloatArray:
+        gridded = nearest(drive.time, values, grid) if as_is else in_digits(average(drive.time, values, grid))
+        return np.pad(gridded, pads, mode="edge")
+
+    return GriddedDrive(
+        drive.name,
+        grid[0] + STEP * (np.arange(len(grid) + sum(pads)) - pads[0]),
+        np.pad(offset, pads),
+        np.pad(valid, pads),
+        column(drive.lane_width, as_is=False),
+        {name: column(values, as_is=name in held) for name, values in drive.context.items()},
+        drive.levels,
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from msgspec import structs
@@ -25,7 +25,10 @@ from xosc_lateral.drivers.evaluation.metrics import (
 from xosc_lateral.drivers.fitting.context_effects import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.drivers.fitting.fitting import fit_population, fit_runs
 from xosc_lateral.drivers.fitting.joined_bands import in_bands, measured
+from xosc_lateral.drivers.fitting.models.autoregressive_coarse import FitSettings
+from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
 from xosc_lateral.drivers.model.core.base import ModelKind
+from xosc_lateral.drivers.model.core.registry import FitCore
 from xosc_lateral.drivers.model.effects import Acts, Effect
 from xosc_lateral.drivers.model.profile import COLUMNS, DriverProfile, Provenance
 from xosc_lateral.drivers.model.seeds import child, generator
@@ -39,6 +42,8 @@ from xosc_lateral.extras.loop.significance import LoopSeed
 from xosc_lateral.extras.loop.terms.hidden import CycleTerm
 from xosc_lateral.extras.loop.timeline import Coarse, Timeline, coarse_middle
 
+# Of folds, which 24 runs are drawn of: a thousand drivers move their spreads by 1 %, which is half of what the runs do.
+ROUGH = partial(fit_autoregressive, settings=FitSettings(effort=0.25))
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
 
 
@@ -153,10 +158,10 @@ def _held_out_runs(
         held = setting.blocks % folds == fold
         used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
         without = fit_model(coarse.only(coarse_middle(used)), start.terms)
-        profiles = [setting.fixed or fit_without(without, used, setting.kind, "before", None)]
+        profiles = [setting.fixed or fit_without(without, used, setting.kind, "before", None, roughly=True)]
         if selection.accepted or setting.kind is not setting.refined_kind:
             fitted = without if nested is None else nested.scored[fold].final
-            profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None))
+            profiles.append(fit_without(fitted, used, setting.refined_kind, "after", None, roughly=True))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
             runs = residual.simulated_runs(profile, coarse.timeline, child(setting.root, LoopSeed.FOLDS), held=held)
@@ -166,15 +171,20 @@ def _held_out_runs(
 
 
 def fit_without(
-    fitted: Fitted, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None
+    fitted: Fitted, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None, *, roughly: bool = False
 ) -> DriverProfile:
-    """Base model of what is left in these rows without the effects, and the effects."""
+    """Base model of what is left in these rows without the effects, and the effects; `roughly`: for a fold's runs."""
     runs = runs_without(fitted.coarse.timeline, removal_of(fitted), used)
-    return _with_effects(fitted, runs, kind, name, provenance)
+    return _with_effects(fitted, runs, kind, name, provenance, ROUGH if roughly else None)
 
 
 def _with_effects(
-    fitted: Fitted, runs: Sequence[Run], kind: ModelKind, name: str, provenance: Provenance | None
+    fitted: Fitted,
+    runs: Sequence[Run],
+    kind: ModelKind,
+    name: str,
+    provenance: Provenance | None,
+    fit_core: FitCore | None = None,
 ) -> DriverProfile:
     """Base model of runs, a population's with class, lane and speed as `fit` has it, and the effects."""
     if not runs:
@@ -182,7 +192,9 @@ def _with_effects(
     if kind is ModelKind.TWO_LEVEL:
         profile = fit_runs(runs, name=name, model=kind, provenance=provenance)
     else:
-        profile = fit_population(runs, name=name, model=kind, provenance=provenance, neighbours=False)
+        profile = fit_population(
+            runs, name=name, model=kind, provenance=provenance, neighbours=False, fit_core=fit_core
+        )
     effects: tuple[Effect, ...] = tuple(effect for _, own in fitted.estimates.values() for effect in own)
     read = {column for effect in effects for column in effect.columns}  # what they say is measured, and taken out here
     beside = {side: one for side, one in profile.beside.items() if read.isdisjoint(COLUMNS[side])}

@@ -91,21 +91,13 @@ def identify(
     progress: Progress = lambda share, what: None,
 ) -> Identified:
     """Select terms beside the `initial` ones; keep what predicts blocks that it was not selected and sized on."""
-    from threadpoolctl import threadpool_limits
-
-    # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
-    with threadpool_limits(1, user_api="blas"):
-        usable, search = search_of(coarse, seed, excluded, roles, lambda what: progress(0.1, what))
-        selection = name_time_beside(search, select(search, initial))
-        if not selection.accepted:
-            return Identified(usable, selection, replace(search, progress=str))  # a value: nobody is told any more
-        accepted = [one.term for one in selection.accepted]
-
-        def finished(share: float) -> None:
-            progress(0.3 + 0.3 * share, "selecting without a fold")
-
-        nested = nest(search, initial, accepted, finished)
-        return _worst_first(Identified(usable, selection, replace(search, progress=str), nested))
+    usable, search = search_of(coarse, seed, excluded, roles, lambda what: progress(0.1, what))
+    selection = name_time_beside(search, select(search, initial))
+    if not selection.accepted:
+        return Identified(usable, selection, replace(search, progress=str))  # a value: nobody is told any more
+    accepted = [one.term for one in selection.accepted]
+    nested = nest(search, initial, accepted, lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"))
+    return _worst_first(Identified(usable, selection, replace(search, progress=str), nested))
 
 
 def search_of(
@@ -184,7 +176,7 @@ def _worst_first(identified: Identified) -> Identified:
         terms = [one.term for one in identified.selection.accepted]
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
         nested = identified.nested.only(terms)
-        gains = [nested.of(term) if term.predictable else None for term in terms]
+        gains = [nested.of(term) if term.predictable(identified.selection.final) else None for term in terms]
         identified = replace(identified, nested=nested)
         fallen = [(gain.mean, term) for term, gain in zip(terms, gains, strict=True) if gain and not gain.stands]
         if fallen:

@@ -156,17 +156,20 @@ def p_value_words(p_value: float) -> str:
 def meaning(finding: Finding) -> str:
     """What an effect means, in sentences that need no statistics."""
     words = ANY_TIME if finding.effect == CHANGE_WITH_TIME else KINDS[finding.kind][1]
-    sentence, whole_drives = finding_sentence(finding), finding.columns and finding.lag_s is None
-    usual = "It goes by the mean of each drive, not by changes within one."
-    compared = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
+    sentence, timeless = finding_sentence(finding), finding.lag_s is None and finding.passage is None
     return " ".join(
         [
             *([] if finding.columns or not words else [words]),
             f"{sentence[0].upper()}{sentence[1:]}.",
-            *([usual] if whole_drives and finding.passage is None else []),
+            *(
+                ["It goes by the mean of each drive, not by changes within one."]
+                if timeless and finding.columns
+                else []
+            ),
             f"Chance gives one as strong {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
-            f"On stretches that nothing was fitted to, the profile was {_mm(finding.error_before)} off before, and is "
-            f"{_mm(finding.error_after)} off now ({compared}).",
+            "On stretches that nothing was fitted to, the profile was "
+            f"{1e3 * finding.error_before:.0f}{GAP}mm off before, and is {1e3 * finding.error_after:.0f}{GAP}mm off "
+            f"now ({_PLAIN_GROUPS.get(finding.statistic, finding.measure)}).",
         ]
     )
 
@@ -260,10 +263,6 @@ def verdict(result: LoopResult) -> str:
     )
     unseen = f"What is not recorded cannot be named{f': {alike}' if alike else ''}."
     return f"{words} {unseen} {shown_words(result.shown)}"
-
-
-def _mm(value: float) -> str:
-    return f"{1000.0 * value:.0f}{GAP}mm"
 
 
 # ---- what drives can show ----

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
 from xosc_lateral.drivers.model.effects.hidden import half_cosines
@@ -73,8 +74,6 @@ def low_frequencies(
 
 def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence[int]) -> dict[int, float]:
     """p-value of the first so many columns by F tests at low frequencies alone, which tell what chance does [1]_."""
-    from scipy.stats import f
-
     p_values = {}
     for order in orders:
         basis = orthonormal(columns[:, :order])
@@ -83,7 +82,7 @@ def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence
             explained = float(np.sum(np.square(basis.T @ rows)))
             left = max(float(rows @ rows) - explained, 1e-300)
             ratio = explained / basis.shape[1] / (left / others)
-            p_values[order] = max(float(f.sf(ratio, basis.shape[1], others)), MINIMUM_P)
+            p_values[order] = max(float(fdtrc(basis.shape[1], others, ratio)), MINIMUM_P)
     return p_values
 
 
@@ -96,8 +95,6 @@ def step_moments(coarse: Coarse) -> NDArray[np.intp]:
 
 def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
     """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows."""
-    from scipy.stats import f
-
     bases = [orthonormal(waves[:, :order]) for order in ORDERS if order <= waves.shape[1]]
     unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
 
@@ -109,7 +106,7 @@ def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng
         log_p_values = []
         for explained, degrees in tests:
             ratio = explained / degrees / ((total - explained) / (len(rows) - degrees))
-            log_p_values.append(-f.logsf(ratio, degrees, len(rows) - degrees))
+            log_p_values.append(-np.log(np.maximum(fdtrc(degrees, len(rows) - degrees, ratio), MINIMUM_P)))
         return np.asarray(np.max(log_p_values, axis=0))
 
     # of the logarithm of a least p the tail is exponential, whatever the tests have in common

@@ -127,8 +127,7 @@ class Term(ABC):
         """Columns of each other effect that explains as much."""
         return ()
 
-    @property
-    def predictable(self) -> bool:
+    def predictable(self, fitted: Fitted) -> bool:
         """Whether the model's likelihood of rows that it was not fitted on can tell this term from nothing."""
         return self.seen_held_out
 

@@ -19,7 +19,7 @@ from xosc_lateral.drivers.model.effects.shapes import Form
 from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
 from xosc_lateral.extras.loop.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.extras.loop.columns import Column
-from xosc_lateral.extras.loop.dictionary import beside, of_unit_variance, orthonormal
+from xosc_lateral.extras.loop.dictionary import LIKELIHOOD_MARGIN, beside, of_unit_variance, orthonormal
 from xosc_lateral.extras.loop.timeline import COARSE, Coarse
 
 Alternatives = tuple[tuple[str, ...], ...]  # Columns of each effect that explains as much.
@@ -69,16 +69,18 @@ class Refinement:
         """Shape, timing, shape again, timing again, each time in finer steps."""
         self._quantities.clear()  # of other columns
         self._responses.clear()
-        best = Refined(effect, self.scores([effect])[0] - price, price)
-        best = self._best(best, list(self._shapes(best.effect, columns)))
+        shapes = list(self._shapes(effect, columns))
+        best, scores = self._best(Refined(effect, self.scores([effect])[0] - price, price), shapes)
+        near = np.flatnonzero(scores > best.score - LIKELIHOOD_MARGIN)
         for step in LAG_STEPS:
             responses = RESPONSES if step > LAG_STEPS[-1] else FINE_RESPONSES
             distance = np.abs(np.log(np.array(responses) / max(best.effect.response_s, 0.1)))
-            near = [responses[index] for index in np.argsort(distance, kind="stable")[:5]]
+            about = [responses[index] for index in np.argsort(distance, kind="stable")[:5]]
             lags = [round(float(lag), 1) for lag in lags_about(best.effect.lag_s, 2.0 * step, step)]
-            timings = (structs.replace(best.effect, lag_s=lag, response_s=late) for lag in lags for late in near)
-            best = self._best(best, [(timed, best.price) for timed in timings])
-        return self._best(best, list(self._shapes(best.effect, columns)))
+            timings = (structs.replace(best.effect, lag_s=lag, response_s=late) for lag in lags for late in about)
+            best, _ = self._best(best, [(timed, best.price) for timed in timings])
+        shapes = list(self._shapes(best.effect, columns))
+        return self._best(best, shapes if isinstance(effect, Product) else [shapes[at] for at in near])[0]
 
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
@@ -119,12 +121,13 @@ class Refinement:
             self._responses[key] = running_sums(self._coarse, self._quantities[shape], effect.response_s)
         return means_by_second(self._responses[key], round(effect.lag_s / timeline.step))
 
-    def _best(self, best: Refined, others: Sequence[Priced]) -> Refined:
+    def _best(self, best: Refined, others: Sequence[Priced]) -> tuple[Refined, FloatArray]:
+        """The best so far or a better one, and the scores of the others, less their prices."""
         if not others:
-            return best
+            return best, np.zeros(0)
         scores = np.asarray(self.scores([effect for effect, _ in others])) - [price for _, price in others]
         at = int(np.argmax(scores))
-        return Refined(others[at][0], float(scores[at]), others[at][1]) if scores[at] > best.score else best
+        return (Refined(others[at][0], float(scores[at]), others[at][1]) if scores[at] > best.score else best), scores
 
     def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[Priced]:
         """Other shapes of a column, scales and centres of a product, with their prices: a finer choice costs more."""

@@ -14,6 +14,7 @@ from logging import getLogger
 
 import numpy as np
 from msgspec import structs
+from scipy.special import stdtr
 
 from xosc_lateral.base.numbers import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
@@ -265,8 +266,6 @@ def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:
     counted = int(np.count_nonzero(seconds))
     if part.start == part.stop or counted < MIN_DRIVES:
         return False
-    from scipy.stats import t
-
     _, scales, known = design_of(coarse, fitted.terms)
     says = coarse.by_drive(scales[:, part] @ fitted.log_sizes[part])
     level = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
@@ -274,7 +273,7 @@ def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:
     drives = np.arange(coarse.drives)
     (slope,), ((variance,),) = clustered_least_squares(says[:, None], level, drives)
     error = float(np.sqrt(variance * small_sample_factor(counted, counted, 2)))
-    return error > 0.0 and float(t.cdf((slope + 0.5) / error, counted - 2)) < UNDONE_LEVEL
+    return error > 0.0 and float(stdtr(counted - 2, (slope + 0.5) / error)) < UNDONE_LEVEL
 
 
 def _tested_again(search: Search, selection: Selection, candidate: Accepted) -> Selection:

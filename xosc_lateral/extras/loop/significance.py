@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 import numpy as np
+from scipy.special import chdtrc, chdtri
 
 from xosc_lateral.base.arrays import FloatArray, IndexArray
 
@@ -91,9 +92,7 @@ def effective_number(draws: FloatArray) -> float:
 
 def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
     """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
-    from scipy.stats import chi2
-
-    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), MINIMUM_P), 1))
+    return np.asarray(chdtri(1, np.maximum(chdtrc(degrees, chi_square), MINIMUM_P)))
 
 
 def draw_null(residual: FloatArray, drive: IndexArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:

@@ -182,6 +182,7 @@ class FitSettings:
     coarse_window: float = 5.0  # Windows that volatility is seen by. [s]
     snippet: float = 10.0  # Length of the snippets that are compared. [s]
     rounds: int = 3  # Of simulating and comparing: more change nothing beyond the standard error of held-out drives.
+    effort: float = 1.0  # Share of the usual number of drivers that rounds simulate. [-]
     seed: int = 20240517  # Of the simulations.
     step: float = STEP
 

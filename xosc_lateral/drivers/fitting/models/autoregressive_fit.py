@@ -153,7 +153,8 @@ def fit_autoregressive(
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
     model = matched(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))), runs, settings)
     length = round(settings.snippet / settings.step) + 1
-    model = with_bursts(model, runs, drives, lambda made: _drives_of(made, length, settings.seed, SIMULATED_DRIVERS))
+    few = round(settings.effort * SIMULATED_DRIVERS)
+    model = with_bursts(model, runs, drives, lambda made: _drives_of(made, length, settings.seed, few))
     return rounded(replace(model, limits=_limits(everything, mean, _held_reach(model, settings))))
 
 
@@ -236,7 +237,9 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
     many = min(max(FOR_EACH * len(real) // SNIPPETS_EACH, SIMULATED_DRIVERS), MOST_SIMULATED)
     slopes: FloatArray | None = None
     for left in reversed(range(settings.rounds)):
-        simulated = _drives_of(model, length, settings.seed, SIMULATED_DRIVERS if left else many)
+        simulated = _drives_of(
+            model, length, settings.seed, round(settings.effort * (SIMULATED_DRIVERS if left else many))
+        )
         lacks, moments = spectrum - _log_spectrum([simulated], window), _moments(simulated.reshape(-1, length))
         if slopes is None:
             nudged = _drives_of(_volatile(model, VARIANCE_NUDGE, VARIANCE_NUDGE), length, settings.seed, len(simulated))

@@ -22,6 +22,10 @@ ALIASES = {"best": "autoregressive"}
 """Other names of models, on the command line."""
 
 
+FitCore = Callable[[Sequence[FloatArray], Sequence[str]], CoreModel]
+"""From relative offsets and the name of each run's drive to a core model."""
+
+
 @dataclass(frozen=True, slots=True)
 class KnownModel:
     """A core model and its fit.
@@ -31,7 +35,7 @@ class KnownModel:
     """
 
     model: type[CoreModel]
-    fit: Callable[[Sequence[FloatArray], Sequence[str]], CoreModel]
+    fit: FitCore
 
 
 def _fit_two_level(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> CoreModel:

@@ -180,12 +180,15 @@ def probability_of_persistence(
     squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
 ) -> float:
     """Probability that loudness of `CLUSTER_S` at most, beside what is `known`, persists as much."""
+    from scipy.fft import next_fast_len
+
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = beside(basis, squares)
     lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
     weights = np.exp(-lags / np.asarray(MEMORIES_S)[:, None])
-    scales, size = np.sqrt(valid.sum() * (weights**2).sum(axis=1)), len(squares) + int(lags[-1])
+    scales = np.sqrt(valid.sum() * (weights**2).sum(axis=1))
+    size = next_fast_len(len(squares) + int(lags[-1]), real=True)
 
     def score(series: FloatArray) -> float:
         products = np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags]

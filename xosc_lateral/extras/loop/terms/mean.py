@@ -29,7 +29,7 @@ from xosc_lateral.extras.loop.columns import Column, read_column
 from xosc_lateral.extras.loop.dictionary import Search, beside
 from xosc_lateral.extras.loop.drives import OwnSlopes, own_slopes
 from xosc_lateral.extras.loop.low_frequencies import penalised
-from xosc_lateral.extras.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model
+from xosc_lateral.extras.loop.model import Description, Fitted, Outcome, Stage, Term, fit_model, proper
 from xosc_lateral.extras.loop.omnibus import KERNELS, SECONDS, SMOOTH_COVARIANCE, check_remainder, tents
 from xosc_lateral.extras.loop.passage import Passage, typical_passage
 from xosc_lateral.extras.loop.terms.column import driven_values, of_kind
@@ -78,6 +78,11 @@ class MeanTerm(SearchedTerm):
         """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
         return WhitenedRegression(after.whitener, fitted.coarse.offset, fitted.columns)
 
+    def predictable(self, fitted: Fitted) -> bool:
+        """Not where drives surely differ: no other drive knows what it does in one, and their mean is right in none."""
+        slopes = self.own_slopes(fitted)
+        return slopes is None or not slopes.differ
+
     def matches(self, other: Term) -> bool:
         """Whatever its course over time."""
         return isinstance(other, MeanTerm) and self.columns == other.columns
@@ -85,12 +90,15 @@ class MeanTerm(SearchedTerm):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between the ends of its column; where drives surely differ, in those in which it surely acts."""
         described, slopes = super().describe(fitted, effects, key), self.own_slopes(fitted)
-        if slopes is not None and slopes.differ:
-            described = replace(described, own_slopes=slopes)
-            if slopes.there:
-                size, error = described.size_m * slopes.size_there, abs(described.size_m) * slopes.error_there
-                described = replace(described, size_m=size, size_error=error)
-        return described
+        if slopes is None or not slopes.differ:
+            return described
+        if slopes.there:
+            effect = proper(effects, ColumnEffect)  # type: ignore[type-abstract]
+            # as its timing and shape leave it open
+            wider = float(np.max(effect.errors / np.sqrt(np.diag(fitted.covariance)[fitted.mean_part(self)])))
+            size, error = described.size_m * slopes.size_there, wider * abs(described.size_m) * slopes.error_there
+            described = replace(described, size_m=size, size_error=error)
+        return replace(described, own_slopes=slopes)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""

@@ -10,7 +10,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -83,7 +83,10 @@ def known_log_scale(fitted: Fitted) -> FloatArray:
 
 def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
     """What the best other column may do to the movement's size, shape (n, k), and its p-value."""
-    return ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
+    key = (what_a_column_may_do, fitted.terms)
+    if key not in search.tested:
+        search.tested[key] = ColumnSearch(search, SpreadTerm, fitted).likely_response(MAY_ACT)
+    return cast(tuple[FloatArray, float], search.tested[key])
 
 
 @dataclass(frozen=True, eq=False)

@@ -201,8 +201,7 @@ class TimeSpreadTerm(Term):
     slow: bool = False  # Of the slower movement only.
     alike: Alternatives = ()
 
-    @property
-    def predictable(self) -> bool:
+    def predictable(self, fitted: Fitted) -> bool:
         """As far as the innovations change."""
         return not self.slow
 
