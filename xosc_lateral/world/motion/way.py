@@ -152,9 +152,7 @@ def _why(way: Way, network: RoadNetwork, k: int) -> str:
     options = network.next_lanes(here, int(way.lane[k]), side)
     if not options:
         return LANE_ENDS
-    if len(options) > 1 and network.straightest(options).road != there:
-        return "the way turns"
-    return ""
+    return "the way turns" if len(options) > 1 and network.straightest(options).road != there else ""
 
 
 def _break(way: Way, network: RoadNetwork, k: int, why: str) -> Break:

@@ -122,9 +122,7 @@ class Road:
 
 def normal_angle(angle: float) -> float:
     """The angle in (-pi, pi]. [rad]"""
-    if -pi < angle <= pi:
-        return angle
-    return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
+    return angle if -pi < angle <= pi else angle - TWO_PI * ceil((angle - pi) / TWO_PI)
 
 
 def find_lane(road: Road, lane: int, s: float, path: str | None = None) -> Lane:

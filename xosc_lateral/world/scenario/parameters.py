@@ -77,9 +77,7 @@ class Scope:
 
     def local_values(self) -> dict[str, str]:
         """All values of this scope and its parents, the global one left out; inner ones win."""
-        if self.parent is None:
-            return {}
-        return {**self.parent.local_values(), **self.values()}
+        return {} if self.parent is None else {**self.parent.local_values(), **self.values()}
 
 
 def satisfies(value: str, rule: Rule, limit: str) -> bool:
@@ -269,9 +267,7 @@ class _Parser:
     def _comparison(self) -> Value:
         value = self._sum()
         operator = self._accept(*COMPARISONS)
-        if operator is None:
-            return value
-        return COMPARISONS[operator](_number(value), _number(self._sum()))
+        return value if operator is None else COMPARISONS[operator](_number(value), _number(self._sum()))
 
     def _sum(self) -> Value:
         value = self._product()
