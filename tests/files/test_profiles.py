@@ -105,7 +105,7 @@ def test_a_folder_that_is_not_there_is_no_library(tmp_path: Path) -> None:
 BAD = {
     "not JSON": ('{"format": \n oops', ":2: not JSON"),
     "NaN": (SMALLEST.replace("0.01", "NaN"), "NaN is not a number in JSON"),
-    "deep": ("[" * 100_000, "levels of nested JSON: 100000, at most 64"),
+    "deep": ("[" * 100_000, "levels of nesting: 100000, at most 64"),
     "a list": ("[]", "not a driver profile"),
     "other format": (broken(format="x"), "not a driver profile"),
     "newer": (broken(version=99), "file format 99; this version of xosc-lateral reads 2: update the package"),

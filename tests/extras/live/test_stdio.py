@@ -67,7 +67,7 @@ def test_the_state_goes_to_another_process_and_on() -> None:
         ('{"restore": {}}', "not a state of live traffic"),
         ('{"time": 0, "vehicles": {"a": {"speed": 1%s, "lane_width": 3}}}' % ("0" * 400), "a number of 401 digits"),
         ('{"time": 1%s, "vehicles": {}}' % ("0" * 5000), "no JSON: Exceeds the limit"),
-        ("[" * 1000, "levels of nested JSON: 1000, at most 64"),
+        ("[" * 1000, "levels of nesting: 1000, at most 64"),
         ('{"time": 0, "vehicles": {"\\ud800": {"speed": 30, "lane_width": 3}}}', "surrogates not allowed"),
         ('{"time": 0, "vehicles": {"a": {"speed": 30, "lane_width": 3, "following": "no"}}}', "expected true or false"),
         ('{"time": 0, "vehicles": {"a": {"speed": 30, "lane_width": 3, "curvatur": 0}}}', "unknown column 'curvatur'"),
