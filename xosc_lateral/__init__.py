@@ -157,6 +157,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> object:
     """Load a public name."""
     from importlib import import_module
+    from types import FunctionType
 
     if name in _HOME:
         home = f"{__name__}.{_HOME[name]}"
@@ -167,6 +168,10 @@ def __getattr__(name: str) -> object:
         if not home:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(home), name)
+    if isinstance(value, FunctionType):
+        from xosc_lateral.workflows.options import in_python
+
+        value = in_python(value)
     globals()[name] = value
     return value
 

@@ -18,6 +18,8 @@ COPIES = re.compile(r"(?<!\S)\S*[/\\]xosc-lateral-\w{8}[/\\]elsewhere[/\\]([a-zA
 class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
 
+    typed: str | None = None  # the line as the command line says it, where a call of Python says it in its own words
+
     def __str__(self) -> str:
         return printable(by_owner(cut(super().__str__())))
 

@@ -121,7 +121,7 @@ app.callback()(_root)
 
 def _in_words(error: XoscLateralError | OSError) -> str:
     """What went wrong, after the option at fault; the system's errors in the form of ours, file first, no number."""
-    text = str(error)
+    text = getattr(error, "typed", None) or str(error)
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
         text = f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
     return ": ".join([*getattr(error, "__notes__", ()), text])

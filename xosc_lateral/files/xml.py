@@ -126,9 +126,7 @@ def read_document(path: Path) -> XmlDocument:
     """Read a file. The tree is shared between callers: never change it. Raises `FormatError`."""
     state = check_regular(path)
     guard_input(path)
-    if state.st_size > MAX_CACHED_BYTES:
-        return _read(path)
-    return _read_cached(str(path), state_key(state))
+    return _read(path) if state.st_size > MAX_CACHED_BYTES else _read_cached(str(path), state_key(state))
 
 
 @lru_cache(maxsize=16)  # catalogs are named by thousands of scenarios; a changed file has another key

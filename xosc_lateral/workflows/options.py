@@ -13,8 +13,11 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from enum import StrEnum
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
+
+from xosc_lateral.base.errors import XoscLateralError
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -181,6 +184,39 @@ def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
     return {name: options[name].value(name, value) for name, value in stated.items() if value is not None}
 
 
+OPTION = re.compile(r"xosc-lateral [^;)]*|(?<![\w.-])--([a-z]+(?:-[a-z]+)*)(?![\w.-])")
+"""As a sentence names it, but for what is to be typed; those of other programs have signs that ours lack."""
+
+
+def in_python(call: Verb) -> Verb:
+    """A call as Python's users have it: its errors name keywords where the command line names options."""
+    keywords = dict.fromkeys(("--map", "--mapping"), "columns") | {
+        flag: name
+        for name, option in {**SHARED, **getattr(call, "__settings__", {}), **getattr(call, "__options__", {})}.items()
+        if not option.said_by
+        for flag in option.flags
+    }
+
+    @wraps(call)
+    def called(*given: Any, **stated: Any) -> Any:
+        try:
+            return call(*given, **stated)
+        except XoscLateralError as error:
+            if error.typed is None:  # else a call within this one has said it
+                error.typed = str(error)
+                error.args = (
+                    OPTION.sub(
+                        lambda word: f"`{keywords.get(word[0], word[1].replace('-', '_'))}`" if word[1] else word[0],
+                        error.typed,
+                    ),
+                    *error.args[1:],
+                )
+            raise
+
+    called.__module__ = "xosc_lateral"  # where it is found again, by another process
+    return cast(Verb, called)
+
+
 def spelled_out(settings: type) -> Callable[[Verb], Verb]:
     """Name the options that a call takes as keywords in its signature, for help and completion."""
 
@@ -202,6 +238,7 @@ def spelled_out(settings: type) -> Callable[[Verb], Verb]:
         parameters, _, _ = described.partition("\n\nRaises")
         text = inspect.cleandoc(verb.__doc__ or "")
         verb.__doc__ = text.replace(f"options\n    `{settings.__name__}`.", parameters)
+        verb.__settings__ = options_of(settings)  # type: ignore[attr-defined]
         return verb
 
     return with_options

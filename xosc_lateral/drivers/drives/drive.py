@@ -244,9 +244,7 @@ def _changes(drive: Drive, rules: CutRules) -> BoolArray:
 
 def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     """Rows below the least speed; none when no speed was recorded. Shape (n,). [-]"""
-    if drive.speed is None:
-        return np.zeros(len(drive), dtype=np.bool_)
-    return np.asarray(drive.speed < rules.min_speed)
+    return np.zeros(len(drive), dtype=np.bool_) if drive.speed is None else np.asarray(drive.speed < rules.min_speed)
 
 
 def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:

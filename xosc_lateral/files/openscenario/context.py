@@ -164,9 +164,7 @@ def _value(e: XmlElement, name: str, kind: type[Any], xml: Xml, context: Context
         return None if e.raw(name) is None else context.entity(e, name)
     if xml.is_parameter:
         return parameter_name(e.raw(name) or e.text(name))
-    if xml.is_road:
-        return e.text(name).removesuffix(ZERO_DECIMALS)
-    return e.optional(name, kind, finite=xml.finite)
+    return e.text(name).removesuffix(ZERO_DECIMALS) if xml.is_road else e.optional(name, kind, finite=xml.finite)
 
 
 def _below(e: XmlElement | None, above: list[str]) -> XmlElement | None:

@@ -266,9 +266,7 @@ def _rate(
 
 
 def _since(since: float | None, holds: bool, now: float) -> float | None:
-    if not holds:
-        return None
-    return now if since is None else since
+    return None if not holds else now if since is None else since
 
 
 def _is_off_road(state: EntityState) -> bool:

@@ -301,9 +301,7 @@ def holds(left: float, rule: Rule, right: float) -> bool:
         return beyond < -EPSILON
     if rule is Rule.GREATER_OR_EQUAL:
         return beyond >= -EPSILON
-    if rule is Rule.LESS_OR_EQUAL:
-        return beyond <= EPSILON
-    return (abs(beyond) < EPSILON) is (rule is Rule.EQUAL_TO)
+    return beyond <= EPSILON if rule is Rule.LESS_OR_EQUAL else (abs(beyond) < EPSILON) is (rule is Rule.EQUAL_TO)
 
 
 class Values:

@@ -286,9 +286,7 @@ class RunningCondition:
             return False
         if edge is ConditionEdge.RISING:
             return now and not self._last
-        if edge is ConditionEdge.FALLING:
-            return self._last and not now
-        return now is not self._last
+        return self._last and not now if edge is ConditionEdge.FALLING else now is not self._last
 
     def _delayed(self, time: float) -> bool:
         """Value at an earlier time; a true one that came and went since the last look counts, too."""

@@ -129,9 +129,7 @@ class Transition:
         if self.dimension is DynamicsDimension.RATE:
             return self.peak_rate
         change = self.target - self.start
-        if self.is_step:
-            return copysign(1e10, change)
-        return _PEAK_SLOPE[self.shape] * change / max(self.range, EPSILON)
+        return copysign(1e10, change) if self.is_step else _PEAK_SLOPE[self.shape] * change / max(self.range, EPSILON)
 
     def advance(self, delta: float) -> None:
         """Move the parameter by `delta` (divided by the stretch), staying within 0 and the range."""

@@ -260,9 +260,7 @@ class _Parser:
         return value
 
     def _not(self) -> Value:
-        if self._accept("not"):
-            return not _boolean(self._nested(self._not))
-        return self._comparison()
+        return not _boolean(self._nested(self._not)) if self._accept("not") else self._comparison()
 
     def _comparison(self) -> Value:
         value = self._sum()

@@ -48,9 +48,7 @@ class TargetPlayer(Struct, frozen=True):
         """The version to write."""
         if self.version is not None:
             return self.version
-        if self.player is Player.CARLA:
-            return (1, 0)
-        return min(scenario.header.version, VERSIONS[-1])
+        return (1, 0) if self.player is Player.CARLA else min(scenario.header.version, VERSIONS[-1])
 
 
 STANDARD = TargetPlayer()

@@ -128,9 +128,7 @@ def _angle(state: EntityState, kind: AngleType, system: CoordinateSystem, simula
     if system is CoordinateSystem.ENTITY:
         return 0.0
     if system is CoordinateSystem.TRAJECTORY:
-        if state.path is None:
-            return None
-        return state.plane.heading - state.path.path.at(state.path.s).tangent
+        return None if state.path is None else state.plane.heading - state.path.path.at(state.path.s).tangent
     actual: float = getattr(state.pose, kind)
     if system is CoordinateSystem.WORLD:
         return actual + simulation.network.header_offset.heading if kind is AngleType.HEADING else actual
