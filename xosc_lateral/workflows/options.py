@@ -198,9 +198,9 @@ def in_python(call: Verb) -> Verb:
     }
 
     @wraps(call)
-    def called(*given: Any, **stated: Any) -> Any:
+    def called(*args: Any, **kwargs: Any) -> Any:
         try:
-            return call(*given, **stated)
+            return call(*args, **kwargs)
         except XoscLateralError as error:
             if error.typed is None:  # else a call within this one has said it
                 error.typed = str(error)

@@ -114,10 +114,10 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     nearby, (u, i, j, paths) = around.NearestVehicles.with_no_one(n), _along_paths(roads, places, on)
     seen = around.OtherVehicles(np.full(len(i), np.nan), np.full(len(i), np.nan), np.zeros(len(i), dtype=np.bool_))
     for path, part in paths:
-        found = around.see_along(
+        in_view = around.see_along(
             path, u[i[part]], offset[i[part]], places.road, places.s, t, direction, roads.centre, j[part]
         )
-        for values, theirs in zip(seen, found, strict=True):
+        for values, theirs in zip(seen, in_view, strict=True):
             values[part] = theirs
     gap = around.free_space(seen, *(around.Extent(places.length[k], places.center_x[k]) for k in (i, j)))
     k = np.flatnonzero(gap <= around.SIGHT_DISTANCE)  # most are not: in a straight line one looks further
