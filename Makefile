@@ -58,9 +58,9 @@ test: style names
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m 'not lint and not pages'
 
 # At length: loops from end to end, kills, other processors, recipes followed; what README, pages, examples and helps
-# print; the site.
+# print; the site; the machines that look for faults, on fixed seeds.
 pages: $(DEV_STAMP) $(DOCS_STAMP)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m pages
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m pages tests $(wildcard laboratory/tests/test_find_*.py)
 
 # Under a minute, in one process: everything but what fits, converts, plays, imports or mutates for long.
 FAST := $(addprefix tests/,world/road world/scenario world/motion world/surroundings drivers/drives files test_layers.py)

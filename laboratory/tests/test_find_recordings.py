@@ -8,7 +8,7 @@ from laboratory.find.drivers import Drivers
 from laboratory.find.engine import find, kind_of, shrink, spec_of
 from laboratory.find.recordings import Recordings
 
-pytestmark = pytest.mark.filterwarnings("ignore")
+pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.pages]
 
 
 def test_nothing_is_read_wrongly_in_silence() -> None:

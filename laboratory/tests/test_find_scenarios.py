@@ -14,6 +14,7 @@ from laboratory.find.engine import Finding, shrink, spec_of
 from laboratory.find.judge import told
 from laboratory.find.scenarios import Planted, Scenarios
 
+pytestmark = pytest.mark.pages
 REAL = os.environ.get("ESMINI_LIBRARY")
 Run = dict[str, Any]
 
