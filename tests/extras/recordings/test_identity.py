@@ -147,7 +147,7 @@ def test_cases_of_a_file_are_recordings_of_their_own(tmp_path: Path, road: Path)
     imported = import_drives("tracks", path, road=road)
     assert set(imported.table["drive"]) == {f"{case}:{k}" for case in (1, 2) for k in range(4)}
     assert sum(imported.provenance.rows.values()) == len(made)
-    with pytest.raises(XoscLateralError, match=r"2 recordings .*: name one with --case"):
+    with pytest.raises(XoscLateralError, match=r"2 recordings .*: name one with `case`"):
         reconstruct(path, road=road)
     joined = made.assign(x=made["x"] + 5.0 * made["case_id"]).sort_values(["time", "id"])
     joined.drop(columns="case_id").to_csv(path, index=False)

@@ -302,16 +302,16 @@ def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_
     with pytest.raises(FormatError, match=r"s apart \(median\)"):
         xl.reconstruct(path, road=road, columns=COLUMNS)
     rows.assign(time=rows["time"] + 1e6 * (rows["id"] == "A")).to_csv(path, index=False)
-    with pytest.raises(FormatError, match="--from and --to"):
+    with pytest.raises(FormatError, match="`begin` and `end`"):
         xl.reconstruct(path, road=road, columns=COLUMNS)
 
 
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"road": None}, FormatError, "--road"),
-        ({"host": "Z"}, FormatError, "--host Z"),
-        ({"around": "Z"}, FormatError, "--around Z"),
+        ({"road": None}, FormatError, "`road`"),
+        ({"host": "Z"}, FormatError, "`host` Z"),
+        ({"around": "Z"}, FormatError, "`around` Z"),
         ({"begin": 30.0, "end": 30.2}, FormatError, "no second"),
         ({"format": "video"}, FormatError, "no recording format"),
         ({"vehicles": []}, NotEnoughDataError, "no vehicle"),
@@ -434,7 +434,7 @@ def test_exid_and_its_sisters_drive_on_the_road_that_is_given_with_them(is_ind, 
         (tracks,) = tmp_path.glob("*_tracks.csv")
         known = pd.read_csv(tracks)
         known.drop(columns=[name for name in known if "lane" in name.lower()]).to_csv(tracks, index=False)
-    with pytest.raises(FormatError, match="--road"):
+    with pytest.raises(FormatError, match="`road`"):
         xl.reconstruct(tmp_path)
     road = bent_road(tmp_path, 1.0 / (1500.0 - 5.4), 5.4, 3.6)
     made = xl.reconstruct(tmp_path, tmp_path / "out", road=road)

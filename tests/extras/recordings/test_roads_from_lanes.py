@@ -195,7 +195,7 @@ def test_a_run_of_sumo_drives_on_its_own_network(tmp_path, left_handed, packed):
 @pytest.mark.parametrize(
     ("fcd", "net", "error", "said"),
     [
-        (None, "", FormatError, "--road FILE.net.xml"),
+        (None, "", FormatError, "`road` FILE.net.xml"),
         (None, "<net/>", FormatError, "no lane: not a SUMO network"),
         (None, '<net><lane id="a_0" length="5" allow="pedestrian"/></net>', FormatError, "no lane for vehicles"),
         (None, '<net><lane id="a_0" length="5" shape="1,2"/></net>', FormatError, "shape='1,2' is no line"),

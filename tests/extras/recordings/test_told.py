@@ -51,7 +51,7 @@ def test_velocities_are_speeds_where_there_is_none(tracks: pd.DataFrame, tmp_pat
 
 def test_ind_and_its_like_are_read_with_their_road(tracks: pd.DataFrame, tmp_path: Path) -> None:
     path = write(LAYOUTS["rounD"], tracks, tmp_path)
-    with pytest.raises(FormatError, match="give its road with --road"):
+    with pytest.raises(FormatError, match="give its road with `road`"):
         import_drives("levelx", path)
     made = import_drives("levelx", path, road=kit.road_file(CASE, tmp_path))
     car = made.table[made.table["drive"] == "ind-00-1"]
