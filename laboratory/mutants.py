@@ -71,7 +71,7 @@ SECONDS_AT_MOST = 60.0
 START_TIME, SLOWER = 60.0, 3.0
 """Tests that take longer than this and so many times their usual time hang. [s], [-]"""
 
-QUIETLY = ("-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not lint and not pages")
+QUIETLY = ("-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not lint")
 
 LIBRARIES = ("numpy", "scipy.stats", "scipy.optimize", "pandas", "pyarrow.parquet", "lxml.etree", "msgspec", "numba")
 """What every test's process would load anew."""
