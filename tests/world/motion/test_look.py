@@ -70,6 +70,17 @@ def test_a_place_is_not_judged_by_the_strict_limit_after_an_event_has_moved() ->
     assert not list(compare_tracks(source, late, shifted=10.0))
 
 
+def test_who_drives_beside_the_middle_of_a_bend_is_where_his_speed_takes_him() -> None:
+    """0.4 m to the inside of a bend of 50 m his way is 3.2 m in 400 m shorter: no finding; on a straight it is one."""
+    inside, sooner = np.full(len(TIME), 0.4), EVEN / 0.992
+    assert not [
+        one
+        for one in compare_tracks(track(EVEN, NONE, bend=0.02), track(sooner, inside, bend=0.02))
+        if one.kind == "elsewhere"
+    ]
+    assert "elsewhere" in {one.kind for one in compare_tracks(track(EVEN, NONE), track(sooner, inside))}
+
+
 def test_who_rests_beside_the_middle_is_told_from_when_on(tmp_path: Path) -> None:
     drives = drive(two_roads(tmp_path), entity(), start=0.0)
     offset = 0.2 * np.sin(0.5 * drives.time)

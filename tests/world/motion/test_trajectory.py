@@ -9,6 +9,7 @@ import pytest
 
 from tests.kit.motion import RADIUS, drive, entity, two_roads
 from xosc_lateral.world.motion.nominal import Activity
+from xosc_lateral.world.motion.path_pieces import vertex_times
 from xosc_lateral.world.motion.trajectory import displace, distance_driven
 
 
@@ -73,3 +74,14 @@ def test_being_placed_anew_is_no_driving(tmp_path: Path) -> None:
     motion = drive(network, entity(), activity=activity)
     motion = motion.having(x=motion.x + np.where(np.arange(501) < 250, 0.0, 100.0))
     assert distance_driven(motion)[-1] == pytest.approx(499 * 0.6)
+
+
+@pytest.mark.parametrize(("radius", "step"), [(60.0, 0.05), (200.0, 0.1)])
+def test_bends_that_straight_lines_would_cut_by_half_a_centimetre_have_twice_the_vertices(
+    radius: float, step: float
+) -> None:
+    """At 20 m/s chords of 0.1 s are 8 and 2.5 mm beside them: (20 * 0.1)**2 / (8 radius)."""
+    time = 0.02 * np.arange(500)
+    turned = 20.0 * time / radius
+    times = vertex_times(time, radius * np.sin(turned), radius * (1.0 - np.cos(turned)))
+    assert np.median(np.diff(times)) == pytest.approx(step, rel=0.05)
