@@ -20,18 +20,18 @@ from scipy.ndimage import gaussian_filter1d
 from xosc_lateral.extras.recordings.importers import openacc
 from xosc_lateral.extras.recordings.importers.openacc import GRID_STEP
 
-STEP = 5.0  # [m]
-SCALES = (0.0, 20.0, 60.0, 150.0)  # of the Gaussian along the road; 60 for the field [m]
+ROW_DISTANCE = 5.0  # [m]
+SMOOTHING_SCALES = (0.0, 20.0, 60.0, 150.0)  # of the Gaussian along the road; 60 for the field [m]
 
 
 def laps(files: list[Path]) -> list[list[np.ndarray]]:
-    """Offsets along the road every `STEP`, less their mean: a list of whole laps for each driver. [m]"""
+    """Offsets along the road every `ROW_DISTANCE`, less their mean: a list of whole laps for each driver. [m]"""
     cars = [car for path in files for car in openacc._cars(path, Counter(), [])]
     loop, found = openacc._centre_line(cars), []
     for car in cars:
         index, offset = loop.place(car.x, car.y)
         lap = np.cumsum(np.diff(index, prepend=index[0]) < -0.5 * len(loop.points))
-        grid = np.arange(10.0, len(loop.points) - 10.0, STEP / GRID_STEP)
+        grid = np.arange(10.0, len(loop.points) - 10.0, ROW_DISTANCE / GRID_STEP)
         whole = [lap == k for k in range(lap.max() + 1) if np.ptp(index[lap == k]) > len(loop.points) - 20.0]
         rows = [np.interp(grid, index[part], offset[part]) for part in whole]
         found.append([row - row.mean() for row in rows])
@@ -45,9 +45,9 @@ def explained(drivers: list[list[np.ndarray]], scale: float) -> float:
         for k, lap in enumerate(own):
             rest = own[:k] + own[k + 1 :]
             pairs = [(np.mean(rest[:j] + rest[j + 1 :], axis=0), each) for j, each in enumerate(rest)]
-            pairs = [(gaussian_filter1d(field, scale / STEP), each) for field, each in pairs]
+            pairs = [(gaussian_filter1d(field, scale / ROW_DISTANCE), each) for field, each in pairs]
             weight = sum(field @ each for field, each in pairs) / sum(field @ field for field, _ in pairs)
-            field = max(weight, 0.0) * gaussian_filter1d(np.mean(rest, axis=0), scale / STEP)
+            field = max(weight, 0.0) * gaussian_filter1d(np.mean(rest, axis=0), scale / ROW_DISTANCE)
             shares.append(1.0 - np.var(lap - field) / np.var(lap))
     return float(np.mean(shares))
 
@@ -57,8 +57,8 @@ def main() -> None:
     parser.add_argument("files", type=Path, nargs="+", help="of OpenACC's AstaZero campaign")
     drivers = [own for own in laps(parser.parse_args().files) if len(own) > 2]
     print(f"laps by driver: {[len(own) for own in drivers]}")
-    for scale in SCALES:
-        smooth = [[gaussian_filter1d(lap, scale / STEP) if scale else lap for lap in own] for own in drivers]
+    for scale in SMOOTHING_SCALES:
+        smooth = [[gaussian_filter1d(lap, scale / ROW_DISTANCE) if scale else lap for lap in own] for own in drivers]
         same = [np.corrcoef(a, b)[0, 1] for own in smooth for a, b in combinations(own, 2)]
         other = [np.corrcoef(a, b)[0, 1] for one, two in combinations(smooth, 2) for a, b in product(one, two)]
         words = [f"{np.mean(each):.3f} +- {np.std(each) / len(each) ** 0.5:.3f}" for each in (same, other)]

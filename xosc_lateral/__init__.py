@@ -113,6 +113,9 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
 ]
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
     from xosc_lateral.base.errors import (
         DriverProfileError,
         FormatError,
@@ -168,12 +171,30 @@ def __getattr__(name: str) -> object:
         if not home:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(home), name)
-    if isinstance(value, FunctionType):
-        from xosc_lateral.workflows.options import in_python
+    globals()[name] = in_python(value) if isinstance(value, FunctionType) else value
+    return globals()[name]
 
-        value = in_python(value)
-    globals()[name] = value
-    return value
+
+def in_python(call: Callable[..., Any]) -> Callable[..., Any]:
+    """A call as Python's users have it: its errors name keywords where the command line names options."""
+    from functools import wraps
+
+    from xosc_lateral.base.errors import XoscLateralError
+
+    @wraps(call)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return call(*args, **kwargs)
+        except XoscLateralError as error:
+            if error.typed is None:  # else a call within this one has said it
+                from xosc_lateral.workflows.options import as_keywords
+
+                options = {**getattr(call, "__settings__", {}), **getattr(call, "__options__", {})}
+                error.typed, error.args = str(error), (as_keywords(str(error), options), *error.args[1:])
+            raise
+
+    called.__module__ = __name__  # where it is found again, by another process
+    return called
 
 
 def __dir__() -> list[str]:

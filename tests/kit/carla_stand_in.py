@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any, Self
 
-FRAME = 0.05
+FRAME_TIME = 0.05
 
 
 class Blank:
@@ -123,8 +123,8 @@ class Actor:
         return SimpleNamespace(wheels=[])
 
     def advance(self) -> None:
-        self.transform.location += self.velocity * FRAME
-        self.transform.rotation.yaw += self.turn * FRAME
+        self.transform.location += self.velocity * FRAME_TIME
+        self.transform.rotation.yaw += self.turn * FRAME_TIME
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -183,7 +183,7 @@ class World:
         return self.actors.get(number)
 
     def get_settings(self) -> SimpleNamespace:
-        return SimpleNamespace(synchronous_mode=True, fixed_delta_seconds=FRAME)
+        return SimpleNamespace(synchronous_mode=True, fixed_delta_seconds=FRAME_TIME)
 
     def get_blueprint_library(self) -> Library:
         return Library()
@@ -196,9 +196,9 @@ class World:
     wait_for_tick = tick
 
     def timestamp(self) -> SimpleNamespace:
-        now = self.frame * FRAME
+        now = self.frame * FRAME_TIME
         return SimpleNamespace(
-            frame=self.frame, elapsed_seconds=now, delta_seconds=FRAME, platform_timestamp=time.time()
+            frame=self.frame, elapsed_seconds=now, delta_seconds=FRAME_TIME, platform_timestamp=time.time()
         )
 
     def get_map(self) -> Any:
@@ -317,13 +317,13 @@ def main(runner: str, file: str, seconds: float, rows: str) -> None:
     scenario = player.OpenScenario(world, egos, config, file, timeout=100000)
     clock.restart()
     with Path(rows).open("w", encoding="utf-8") as table:
-        for frame in range(int(seconds / FRAME) + 1):
+        for frame in range(int(seconds / FRAME_TIME) + 1):
             world.tick()
             clock.on_carla_tick(world.timestamp())
             provider.on_carla_tick()
             for actor in [actor for actor in world.actors.values() if "role_name" in actor.attributes]:
                 place = actor.get_location()
-                table.write(f"{frame * FRAME:.2f},{actor.attributes['role_name']},{place.x!r},{-place.y!r}\n")
+                table.write(f"{frame * FRAME_TIME:.2f},{actor.attributes['role_name']},{place.x!r},{-place.y!r}\n")
             scenario.scenario_tree.tick_once()
             if scenario.scenario_tree.status.name != "RUNNING":
                 break

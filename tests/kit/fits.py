@@ -10,13 +10,13 @@ import pytest
 from xosc_lateral.drivers.fitting.models import autoregressive_fit
 
 # An eighth of what a fit simulates, however many packages of tests ask for it at once.
-COARSE = {name: getattr(autoregressive_fit, name) // 8 for name in ("SIMULATED_DRIVERS", "FOR_EACH")}
+COARSE_COUNTS = {name: getattr(autoregressive_fit, name) // 8 for name in ("SIMULATED_DRIVERS", "FOR_EACH")}
 
 
 @contextmanager
 def coarse_fits() -> Iterator[None]:
     """Within it a fit simulates an eighth of the snippets: chance moves its spreads by 2 %."""
     with pytest.MonkeyPatch.context() as patched:
-        for name, number in COARSE.items():
+        for name, number in COARSE_COUNTS.items():
             patched.setattr(autoregressive_fit, name, number)
         yield

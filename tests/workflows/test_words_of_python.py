@@ -40,10 +40,8 @@ def test_what_other_programs_call_their_options_stays() -> None:
     def call() -> None:
         raise xl.SimulationError("start SUMO with --fcd-output.attributes all, esmini with --align_routepositions")
 
-    from xosc_lateral.workflows.options import in_python
-
     with pytest.raises(xl.SimulationError, match=r"--fcd-output\.attributes all, esmini with --align_routepositions"):
-        in_python(call)()
+        xl.in_python(call)()
 
 
 @pytest.mark.parametrize("name", xl.__all__)

@@ -85,9 +85,9 @@ def _read(path: Path, encoding: str | None = None, stated: Stated = PLAIN, **csv
         if "dtype" not in csv:
             csv["dtype"] = _texts_of_digits(head[layout.start :], separator)
         table = _in_parts(text, layout.start, sep=separator, encoding="utf-8-sig", index_col=False, **csv)
-        table = table.loc[
-            :, [name for name in table.columns if not (str(name).startswith("Unnamed: ") and table[name].isna().all())]
-        ]  # a separator at each line's end
+        table = table.drop(  # what a separator at the end of each line makes
+            columns=[name for name in table.columns if str(name).startswith("Unnamed: ") and table[name].isna().all()]
+        )
         table.columns = with_units(list(map(str, table.columns)), layout.units)
         return table.rename(columns=composed)
 

@@ -13,11 +13,8 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from enum import StrEnum
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
-
-from xosc_lateral.base.errors import XoscLateralError
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
@@ -142,15 +139,31 @@ def _documented(text: str, options: Mapping[str, Option], kinds: Mapping[str, An
     documented, entries = inspect.cleandoc(text), list[str]()
     for name, option in options.items():
         if not re.search(rf"^(\w+, )*{name}(, \w+)*( :|$)", documented, flags=re.MULTILINE):
-            words = re.sub("--([a-z]+)", r"`\1`", option.words["help"].replace("; may be repeated", ""))
+            words = option.words["help"].replace("; may be repeated", "")
             entries.append(f"{name} : {kinds[name]}\n    {words}")
     if not entries:
         return documented
     sections = re.split(r"\n\n(?=\w+\n---)", documented)
     if len(sections) == 1 or not sections[1].startswith("Parameters"):
         sections.insert(1, "Parameters\n----------")
-    sections[1] = "\n".join([sections[1], *entries])
+    sections[1] = "\n".join([sections[1], as_keywords("\n".join(entries), options)])
     return "\n\n".join(sections)
+
+
+OPTION_IN_TEXT = re.compile(r"xosc-lateral [^;)\n]*|(?<![\w.-])--([a-z]+(?:-[a-z]+)*)(?![\w-]|\.\w)")
+"""As a sentence names it, but for what is to be typed; those of other programs have signs that ours lack."""
+
+
+def as_keywords(text: str, options: Mapping[str, Option]) -> str:
+    """A text with keywords of Python, in backticks, where it names options of a call; what is to be typed stays."""
+    known = ((name, option) for name, option in {**SHARED, **options}.items() if not option.said_by)
+    keywords = {flag: name for name, option in known for flag in option.flags} | {
+        "--map": "columns",
+        "--mapping": "columns",
+    }
+    return OPTION_IN_TEXT.sub(
+        lambda word: f"`{keywords.get(word[0], word[1].replace('-', '_'))}`" if word[1] else word[0], text
+    )
 
 
 def settable(settings: type) -> list[Field[Any]]:
@@ -182,39 +195,6 @@ def values_of(settings: type, stated: Mapping[str, Any]) -> dict[str, Any]:
     if unknown:
         raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(options)}")
     return {name: options[name].value(name, value) for name, value in stated.items() if value is not None}
-
-
-OPTION = re.compile(r"xosc-lateral [^;)]*|(?<![\w.-])--([a-z]+(?:-[a-z]+)*)(?![\w.-])")
-"""As a sentence names it, but for what is to be typed; those of other programs have signs that ours lack."""
-
-
-def in_python(call: Verb) -> Verb:
-    """A call as Python's users have it: its errors name keywords where the command line names options."""
-    keywords = dict.fromkeys(("--map", "--mapping"), "columns") | {
-        flag: name
-        for name, option in {**SHARED, **getattr(call, "__settings__", {}), **getattr(call, "__options__", {})}.items()
-        if not option.said_by
-        for flag in option.flags
-    }
-
-    @wraps(call)
-    def called(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return call(*args, **kwargs)
-        except XoscLateralError as error:
-            if error.typed is None:  # else a call within this one has said it
-                error.typed = str(error)
-                error.args = (
-                    OPTION.sub(
-                        lambda word: f"`{keywords.get(word[0], word[1].replace('-', '_'))}`" if word[1] else word[0],
-                        error.typed,
-                    ),
-                    *error.args[1:],
-                )
-            raise
-
-    called.__module__ = "xosc_lateral"  # where it is found again, by another process
-    return cast(Verb, called)
 
 
 def spelled_out(settings: type) -> Callable[[Verb], Verb]:

@@ -157,7 +157,7 @@ def test_lane_offset_mode_is_refused(tmp_path: Path, maps: RoadSearch) -> None:
     assert not (tmp_path / "out.xosc").exists()
 
 
-ROUTE = """<RoutePosition><RouteRef><Route name="route" closed="false">
+ROUTE_POSITION = """<RoutePosition><RouteRef><Route name="route" closed="false">
   <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="100"/></Position></Waypoint>
   <Waypoint routeStrategy="shortest"><Position><LanePosition roadId="1" laneId="-1" s="900"/></Position></Waypoint>
 </Route></RouteRef><InRoutePosition><FromLaneCoordinates pathS="50" laneId="-1"/></InRoutePosition></RoutePosition>"""
@@ -165,7 +165,7 @@ ROUTE = """<RoutePosition><RouteRef><Route name="route" closed="false">
 
 @pytest.mark.parametrize("about", ["CARLA:test", "test"])
 def test_who_stays_as_written_on_a_route_starts_where_that_is(tmp_path: Path, maps: RoadSearch, about: str) -> None:
-    source = _scenario(tmp_path, ROUTE, about)
+    source = _scenario(tmp_path, ROUTE_POSITION, about)
     xl.convert(source, tmp_path / "out.xosc", player="carla", road_path=maps.folders, ego=["hero"])
     root = etree.parse(str(tmp_path / "out.xosc")).getroot()
     assert scenario_runner.broken(root) == []
@@ -178,7 +178,7 @@ def test_who_stays_as_written_on_a_route_starts_where_that_is(tmp_path: Path, ma
     )
 
 
-TEMPLATES = ["braking-leader", "curves", "cut-in", "dense-traffic", "jam-end", "overtake-truck"]
+TEMPLATE_NAMES = ["braking-leader", "curves", "cut-in", "dense-traffic", "jam-end", "overtake-truck"]
 
 
 def _for_carla(name: str, folder: Path) -> tuple[xl.Conversion, Path]:
@@ -194,7 +194,7 @@ def test_what_ends_the_parsers_run_is_left_out_of_who_stays_as_written(tmp_path:
 
 
 @pytest.mark.skipif("SCENARIO_RUNNER" not in os.environ, reason="SCENARIO_RUNNER names no checkout of ScenarioRunner")
-@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("name", TEMPLATE_NAMES)
 def test_its_own_code_ends_within_2_cm(name: str, tmp_path: Path) -> None:
     """`SCENARIO_RUNNER_PYTHON` has what ScenarioRunner needs (py_trees 0.8, xmlschema, networkx, Shapely, six ...)."""
     made, output = _for_carla(name, tmp_path)

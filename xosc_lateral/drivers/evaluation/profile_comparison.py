@@ -120,9 +120,7 @@ def common_speed(first: DriverProfile, second: DriverProfile) -> float:
     That of the one whose speeds are known, else of the highway driving test.
     """
     known = [each.validity.speed for each in (first, second) if each.validity.speed is not None]
-    if not known:
-        return HIGHWAY_SPEED
-    return 0.5 * (max(low for low, _ in known) + min(high for _, high in known))
+    return HIGHWAY_SPEED if not known else 0.5 * (max(low for low, _ in known) + min(high for _, high in known))
 
 
 def _measured(profile: DriverProfile) -> sizes.Sizes | None:

@@ -156,6 +156,7 @@ def at_instants(
     share = np.clip(later / np.maximum(time[following] - time[last], 1e-9), 0.0, 1.0)
     between = (share > 0.0) & (part[following] == part[last])
     way = along[last] + np.where(between, share * (along[following] - along[last]), speed[last] * later)
-    when = along[row] + speed[row] * (when[row] - time[row])  # when, instant: no longer asked for at every row
-    instant = np.r_[instant[row], filled]
-    return np.r_[row, last], instant, np.r_[when, way], np.cumsum(new) - 1
+    moved = along[row] + speed[row] * (when[row] - time[row])
+    del when
+    instant = np.r_[instant[row], filled]  # no longer of every row
+    return np.r_[row, last], instant, np.r_[moved, way], np.cumsum(new) - 1

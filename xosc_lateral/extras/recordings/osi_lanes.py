@@ -67,9 +67,7 @@ class RoadIds:
 
     def at(self, road: int, lane: int, s: float) -> int | None:
         """Lane of a place; None: there is none."""
-        if road < 0:
-            return None
-        return self.lanes.get((road, self.network.roads[road].section_number(s), lane))
+        return None if road < 0 else self.lanes.get((road, self.network.roads[road].section_number(s), lane))
 
 
 def write_lanes(message: Any, ids: RoadIds) -> None:

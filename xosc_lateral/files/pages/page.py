@@ -33,9 +33,7 @@ def format_number(value: float, digits: int = 3) -> str:
         return f"{value + 0.0:.0f}" if abs(value) < 1e7 else f"{value:.{digits - 1}e}"
     rounded = f"{value:.{digits - 1}e}"
     magnitude = int(rounded.partition("e")[2])  # of what is shown: 9.996 is 10.0
-    if not -4 <= magnitude < 6:
-        return rounded
-    return f"{value:.{max(0, digits - 1 - magnitude)}f}"
+    return rounded if not -4 <= magnitude < 6 else f"{value:.{max(0, digits - 1 - magnitude)}f}"
 
 
 def format_value(value: object, spec: str = "") -> str:

@@ -124,12 +124,8 @@ class _Origin:
             raise FormatError(what, path=output) from error
         except (TypeError, ValueError, AttributeError, OverflowError) as error:
             raise FormatError(f"its provenance can't be read: {error}", path=output) from error
-        return cls(
-            facts,
-            scenario,
-            replace(settings, library=search.library, allow=search.allow, road_path=search.road_path),
-            variant,
-        )
+        places = {name: getattr(search, name) for name in ("library", "allow", "road_path")}
+        return cls(facts, scenario, replace(settings, **places), variant)
 
 
 ROADS_OPTION = flag("--road", kind=list[Path] | None, metavar="FOLDER",
@@ -175,10 +171,8 @@ def verify(
             if isinstance(defects, WorkerDiedError):
                 defects = [(Reason.FAILED, str(defects))]
             checked[number] = Checked(task.path, tuple(defects))
-    return Verification(
-        tuple(checked[number] for number, _ in tasks),
-        "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today",
-    )
+    done = "outputs have the hashes that they state; none was made again" if fast else "outputs are what is made today"
+    return Verification(tuple(checked[number] for number, _ in tasks), done)
 
 
 class _Task(NamedTuple):
@@ -248,9 +242,8 @@ def _other_row(row: ManifestRow, data: bytes, origin: _Origin) -> Iterator[str]:
 
 def _made_otherwise(output: Path, data: bytes, origin: _Origin) -> list[Defect]:
     """How today's program makes it otherwise, from what its provenance states."""
-    made = convert_scenario(
-        origin.scenario, output, origin.settings, variant_index=origin.variant - 1, saves=False
-    ).data
+    index = origin.variant - 1
+    made = convert_scenario(origin.scenario, output, origin.settings, variant_index=index, saves=False).data
     stated, now = origin.facts, facts_in(made) or {}
     if made.replace(_version_of(now), _version_of(stated), 1) == data:
         return []

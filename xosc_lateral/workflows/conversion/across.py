@@ -60,9 +60,7 @@ def why_untouched(scenario: Scenario, path: Path, actor: str) -> str:
         return "it is a catalog's"
     if at.actors != (actor,) or at.group.actors.select_triggering_entities:
         return "others act in it, too"
-    if max(at.group.maximum_execution_count, at.event.maximum_execution_count) > 1:
-        return "it may run again"
-    return ""
+    return "it may run again" if max(at.group.maximum_execution_count, at.event.maximum_execution_count) > 1 else ""
 
 
 def why_kept(scenario: Scenario, path: Path, actor: str, keeping: Collection[str] = ()) -> str:

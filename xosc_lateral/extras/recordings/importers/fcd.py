@@ -35,7 +35,7 @@ from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane
 from xosc_lateral.workflows.options import flag
 
 LICENCE = "that of the simulation"
-NUMBERS = ("pos", "posLat", "x", "y", "angle", "speed")
+NUMERIC_ATTRIBUTES = ("pos", "posLat", "x", "y", "angle", "speed")
 NET_ENDINGS = (".net.xml", ".net.xml.gz")
 REAR_FROM_FRONT = 0.8  # rear axle behind the front bumper, as a share of the length: 3.7 m of a car of 4.6 m [-]
 
@@ -80,7 +80,7 @@ def read_fcd(path: Path, types: Path | None = None, *, in_lanes: bool = False) -
     Raises `FormatError`, `NotEnoughDataError`.
     """
     stated = sumo.read_vehicle_types(types)
-    rows = pd.DataFrame(_rows(path, in_lanes), columns=["time", "name", "kind", "lane", *NUMBERS])
+    rows = pd.DataFrame(_rows(path, in_lanes), columns=["time", "name", "kind", "lane", *NUMERIC_ATTRIBUTES])
     if rows.empty:
         raise NotEnoughDataError(f"{path}: no vehicle")
     vehicle, names = rows["name"].factorize(sort=True)
@@ -97,7 +97,7 @@ def read_fcd(path: Path, types: Path | None = None, *, in_lanes: bool = False) -
 
 
 def _rows(path: Path, in_lanes: bool) -> Iterator[tuple[Any, ...]]:
-    """Time, name, type, lane and `NUMBERS` of each vehicle at each instant; NaN: not needed, and not there."""
+    """Time, name, type, lane, `NUMERIC_ATTRIBUTES` of each vehicle at each instant; NaN: not needed, and not there."""
     needed = ("speed", "pos", "posLat") if in_lanes else ("speed", "x", "y", "angle")
     for time, element in sumo.fcd_vehicles(path):
         if in_lanes and element.get("posLat") is None:
@@ -107,7 +107,8 @@ def _rows(path: Path, in_lanes: bool) -> Iterator[tuple[Any, ...]]:
         if name is None or (in_lanes and lane is None):
             raise sumo.wrong_element("no id or lane", element, path)
         numbers = (
-            sumo.number_of(element, one, path) if one in needed else float(element.get(one, "nan")) for one in NUMBERS
+            sumo.number_of(element, one, path) if one in needed else float(element.get(one, "nan"))
+            for one in NUMERIC_ATTRIBUTES
         )
         yield time, name, kind, lane, *numbers
 

@@ -48,10 +48,10 @@ CONTROL_NAME = "vehicle_velocity_control"
 """Its only control that keeps to the times of waypoints and does not move them to the lane (since 0.9.16)."""
 FRAME_TIME = 0.05
 """Its default frame. [s]"""
-_PHASE = 0.8
+VERTEX_PHASE = 0.8
 """Where in a frame vertices lie. [-] A velocity that reaches one in time is kept for a whole frame, which leaves
 1 - 1 / phase of what was amiss: all of it, to and fro, amid frames; a quarter here; on a frame no time is left."""
-_SETTLING = 3
+VERTICES_AFTER_STOP = 3
 """Vertices after a stop, a frame apart: what a stop within a frame leaves, half a frame's way, falls to a hundredth."""
 HOLD_DURATION = 3600.0
 """How long after a drive its last waypoint is due. [s]"""
@@ -130,10 +130,10 @@ def _moments(item: Moving, pieces: Sequence[RowStretch], begin: float) -> FloatA
     for piece in pieces:
         rows = slice(piece.first, piece.last + 1)
         times += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        after = np.arange(1, _SETTLING + 1 if piece.stops else 2)
+        after = np.arange(1, VERTICES_AFTER_STOP + 1 if piece.stops else 2)
         times += (float(path.time[piece.last]) + FRAME_TIME * after).tolist()
-    between = (np.floor((np.array(times[1:]) - begin) / FRAME_TIME - _PHASE) + _PHASE) * FRAME_TIME
-    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), _PHASE * FRAME_TIME)))
+    between = (np.floor((np.array(times[1:]) - begin) / FRAME_TIME - VERTEX_PHASE) + VERTEX_PHASE) * FRAME_TIME
+    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), VERTEX_PHASE * FRAME_TIME)))
     return np.asarray(moments)
 
 
@@ -166,11 +166,11 @@ def fit_carla(losses: Losses, draft: Draft, converted: Sequence[str]) -> None:
 def _leave_out_unknown(losses: Losses, scenario: Scenario) -> None:
     for item in elements(losses.root, *_UNKNOWN):
         why, is_unknown = _UNKNOWN[local_name(item)]
-        if is_unknown(item) and not (scenario.header.is_left_handed and local_name(item) in _ITS_OWN):
+        if is_unknown(item) and not (scenario.header.is_left_handed and local_name(item) in _ACTIONS_OF_CARLA):
             losses.action(item, f"ScenarioRunner {why}")
 
 
-_ITS_OWN = ("TrafficSignalStateAction", "TrafficSignalControllerAction", "CustomCommandAction")
+_ACTIONS_OF_CARLA = ("TrafficSignalStateAction", "TrafficSignalControllerAction", "CustomCommandAction")
 """What a scenario written for CARLA means as ScenarioRunner does."""
 _UNKNOWN: dict[str, tuple[str, Callable[[etree._Element], bool]]] = {
     "VisibilityAction": ("has none", lambda item: True),
