@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from html import escape
 
 from xosc_lateral.extras.dossier.claims import Contents, Finding, State, known_anomalies, summary_of
 from xosc_lateral.files.pages.page import Html, KeyFigure, Page, Tone, inline
@@ -74,5 +75,5 @@ def _claim_row(finding: Finding) -> dict[str, object]:
         "figure": claim.figure if value is None else f"{value:.3g} {claim.unit}",
         "bound": claim.bound,
         "from": finding.origin,
-        "test": f"`{claim.test}`" if claim.test else "none",
+        "test": Html(escape(claim.test).replace("/", "/<wbr>").replace("_", "_<wbr>")) if claim.test else "none",
     }
