@@ -31,7 +31,6 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.extras.detect.band import keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
 from xosc_lateral.extras.detect.logistic import (
     ROW_STRIDE,
@@ -41,7 +40,15 @@ from xosc_lateral.extras.detect.logistic import (
     rows_to_train_on,
     train,
 )
-from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, seen_through, views_of
+from xosc_lateral.extras.detect.observation import (
+    PERFECT_SENSOR,
+    Sensor,
+    View,
+    keeping_spectrum,
+    seen_through,
+    spectrum_in,
+    views_of,
+)
 from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
 from xosc_lateral.extras.detect.tracks import STEP, Scene

@@ -37,7 +37,7 @@ _HOME = {
     "Playback": "workflows.playing.call",
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
-    "Evaluation": "workflows.profiles.evaluate",
+    "Evaluation": "workflows.profiles.evaluation_page",
     "Health": "workflows.profiles.health",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -132,10 +132,9 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.detect.sight import Sight
     from xosc_lateral.extras.detect.vary import Variations, vary
     from xosc_lateral.extras.dossier.call import Dossier, dossier
-    from xosc_lateral.extras.live.c_driver import export_c
     from xosc_lateral.extras.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.extras.live.esmini import EsminiTraffic
-    from xosc_lateral.extras.live.fmu import export_fmu
+    from xosc_lateral.extras.live.export import export_c, export_fmu
     from xosc_lateral.extras.live.sumo import SumoTraffic
     from xosc_lateral.extras.live.traffic import Moment, Traffic
     from xosc_lateral.extras.loop.call import ClosedLoop, LoopPlan, close_loop, plan_loop
@@ -150,7 +149,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
-    from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
+    from xosc_lateral.workflows.profiles.evaluate import evaluate
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
     from xosc_lateral.workflows.profiles.fit import fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile

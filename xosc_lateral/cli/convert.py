@@ -65,7 +65,7 @@ def convert(
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.workflows.batch.guard import JobLimits
     from xosc_lateral.workflows.batch.request import is_single
-    from xosc_lateral.workflows.inputs import scenarios_at
+    from xosc_lateral.workflows.opened import scenarios_at
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}

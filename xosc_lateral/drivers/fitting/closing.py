@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.numbers import significant
+from xosc_lateral.base.arrays import FloatArray, significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import tapered_powers
 from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP

@@ -166,7 +166,7 @@ class LoopPlan(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.extras.loop.loop_json import finite, shown_records
+        from xosc_lateral.extras.loop.loop_report import finite, shown_records
 
         return {"shown": finite(shown_records(self._shown))}
 
@@ -250,7 +250,7 @@ class ClosedLoop(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """`report.json`: plain values, as ``--json`` prints them."""
-        from xosc_lateral.extras.loop.loop_json import finite, loop_record
+        from xosc_lateral.extras.loop.loop_report import finite, loop_record
 
         record: dict[str, Any] = finite(loop_record(self._result, self._given.files))
         record["provenance"]["inputs"] = dict(self._given.inputs)
@@ -265,7 +265,7 @@ class ClosedLoop(Result):
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
-        from xosc_lateral.extras.loop.loop_page import loop_page
+        from xosc_lateral.extras.loop.loop_report import loop_page
         from xosc_lateral.files.atomic import together, write_atomically
         from xosc_lateral.files.json_text import canonical_json
 

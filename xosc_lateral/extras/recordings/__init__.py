@@ -2,13 +2,13 @@
 
 VERBS = {
     "import": (
-        "xosc_lateral.extras.recordings.import_verb",
+        "xosc_lateral.extras.recordings.verbs",
         "Convert recordings into drive tables.",
         "profiles",
         "docs/real_data.md, docs/formats.md",
     ),
     "reconstruct": (
-        "xosc_lateral.extras.recordings.reconstruct_verb",
+        "xosc_lateral.extras.recordings.verbs",
         "Turn a recording into a maneuver-based scenario.",
         "verify",
         "docs/how_to/from_a_recording.md",

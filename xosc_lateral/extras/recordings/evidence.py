@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.arrays import BLOCK, FloatArray, IntArray
 from xosc_lateral.drivers.drives.evidence import UNIT_SIZES, noisy
 
 USUAL_WIDTH = 1.8  # [m]

@@ -24,10 +24,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import MAD_TO_SD, FloatArray, IntArray, true_slices
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.numbers import MAD_TO_SD
-from xosc_lateral.base.rows import true_slices
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
 MAX_ERROR = 0.15  # [m]; where the centre's standard error is larger (ends of the road), rows are cut

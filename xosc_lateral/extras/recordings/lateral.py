@@ -11,9 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rates import rate
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import FloatArray, rate, true_slices
 from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW, SETTLED_OFFSET, Course, Rough
 from xosc_lateral.extras.recordings.recorded import MOVING_SPEED, own_lateral
 from xosc_lateral.world.motion.nominal import EntityMotion

@@ -11,7 +11,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.fitting.maneuvers import SIDES, MeasuredChanges, fit_maneuvers
-from xosc_lateral.drivers.model.maneuvers import BEFORE_STEP, Maneuvers
+from xosc_lateral.drivers.model.profile import BEFORE_STEP, Maneuvers
 from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
 from xosc_lateral.extras.recordings.lateral import Transition, lateral_plan
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks

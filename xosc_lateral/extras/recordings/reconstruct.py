@@ -19,10 +19,8 @@ from typing import Unpack
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, rate, true_slices
 from xosc_lateral.base.errors import FormatError, XoscLateralError
-from xosc_lateral.base.rates import rate
-from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.drive import Drive

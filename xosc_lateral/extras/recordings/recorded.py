@@ -11,10 +11,8 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, fitted_rate, rate, true_slices
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.rates import fitted_rate, rate
-from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import lane_levels
 from xosc_lateral.drivers.drives.identity import LONGEST_BRIDGE, LONGEST_GAP, leaps
 from xosc_lateral.world.motion.nominal import EntityMotion

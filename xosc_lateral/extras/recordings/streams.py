@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, true_slices
 from xosc_lateral.extras.recordings.importers.tracks import Strip
 
 SPACING = 1.0  # of points on a path [m]

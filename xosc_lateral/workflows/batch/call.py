@@ -29,7 +29,7 @@ from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.inputs import scenarios_at
+from xosc_lateral.workflows.opened import scenarios_at
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 

@@ -24,7 +24,7 @@ from xosc_lateral.files.remote import is_url
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
-from xosc_lateral.workflows.inputs import scenarios_at
+from xosc_lateral.workflows.opened import scenarios_at
 from xosc_lateral.workflows.options import Option, as_it_is, whole_number
 
 if TYPE_CHECKING:

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, blocks
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.own_clock import is_slow, ticks_of, way_of
-from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT

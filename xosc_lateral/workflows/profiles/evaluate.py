@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
-    GivenDrives,
-    PathLike,
     Paths,
     ProfileLike,
-    Result,
     given_drives,
     given_profile,
     naming,
-    write_page,
 )
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive, Run
-    from xosc_lateral.drivers.evaluation.realism import Realism
-    from xosc_lateral.drivers.evaluation.scores import ProfileScores
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.files.mapping import MappingLike
-    from xosc_lateral.files.pages.figure import Figure
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
 
 
 @declare_options
@@ -59,6 +48,7 @@ def evaluate(
     """
     from xosc_lateral.drivers.drives.drive import all_runs
     from xosc_lateral.drivers.evaluation.scores import score_profile
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
 
     driver = given_profile(profile, library)
     tables = given_drives(drives, columns)
@@ -79,86 +69,3 @@ def _seen_with(driver: DriverProfile, runs: Sequence[Run], drives: Sequence[Driv
         return driver
     _, sensor = driver_runs(runs, drives)
     return driver if sensor is None else replace(driver, sensor=sensor)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Evaluation(Result):
-    """Scores of a profile on measured drives."""
-
-    _scores: ProfileScores
-    profile: DriverProfile
-    _tables: GivenDrives
-
-    @property
-    def ratio(self) -> float:
-        """Mean distance of the ten metrics over that between real drivers; 1: as close as these. [-]"""
-        return self._scores.snippets.ratio
-
-    @property
-    def realism(self) -> Realism:
-        """The fair measure: every condition's distances, those between real drivers (`floor`), and classifiers."""
-        return self._scores.realism
-
-    @property
-    def worst(self) -> tuple[str, float]:
-        """The block that does worst, and its ratio to real drivers; see `to_frame`. [-]"""
-        from xosc_lateral.workflows.profiles.evaluation_page import worst_block
-
-        return worst_block(self._scores)
-
-    @property
-    def messages(self) -> tuple[Note, ...]:
-        """Rows of the tables that are in no drive."""
-        return self._tables.messages
-
-    def headline(self) -> str:
-        """One line."""
-        hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
-        return f"{self.profile.name} on {hours}: " + ", ".join(
-            f"{of} {self.judged(of)}" for of in ("driver", "recording")
-        )
-
-    def judged(self, of: str) -> str:
-        """The "driver", or the "recording", his sensor's error on both sides: "alike", "unlike" or "not known"."""
-        from xosc_lateral.workflows.profiles.evaluation_page import judged
-
-        return judged(self._scores, of)
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_text
-
-        text = evaluation_text(self._scores, self.profile, self._tables.inputs)
-        return "\n".join([text, *self.message_lines()])
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
-        rows = [
-            {"seconds": one.seconds, "metric": name, "distance": distance, "floor": one.floor.by_metric[name]}
-            for one in (self._scores.snippets, self._scores.long_snippets)
-            if one is not None
-            for name, distance in one.distances.by_metric.items()
-        ]
-        frame = pd.DataFrame(rows)
-        return frame.assign(ratio=frame["distance"] / frame["floor"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_record
-
-        record = evaluation_record(self._scores, self.profile, self._tables.inputs)
-        return record | {"messages": self.message_records()}
-
-    def plot(self) -> Figure:
-        """Violins of the ten metrics, measured beside sampled."""
-        from xosc_lateral.workflows.profiles.violins import violin_figure
-
-        shown = self._scores.evaluations[3]
-        return violin_figure(shown.real, shown.artificial)
-
-    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the HTML page."""
-        from xosc_lateral.workflows.profiles.evaluation_page import evaluation_page
-
-        name, tables = f"{self.profile.name}_evaluation.html", self._tables
-        made = partial(evaluation_page, self._scores, self.profile, tables.inputs)
-        return write_page(path, name, made, inputs=tables.files, force=force)

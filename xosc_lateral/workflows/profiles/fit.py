@@ -10,8 +10,7 @@ from xosc_lateral.workflows.result import DrivesLike, PathLike, Paths, ProfileLi
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.drives.drive import Drive
-    from xosc_lateral.drivers.model.maneuvers import Maneuvers
-    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.drivers.model.profile import DriverProfile, Maneuvers
     from xosc_lateral.files.mapping import MappingLike
 
 PRIOR_PROFILE = "rural"
@@ -142,7 +141,7 @@ def fit(
 def _law_of(maneuvers: Maneuvers | PathLike, road: PathLike | None) -> Maneuvers:
     """Of a recording, which an extra reads."""
     from xosc_lateral.base.plugins import service
-    from xosc_lateral.drivers.model.maneuvers import Maneuvers
+    from xosc_lateral.drivers.model.profile import Maneuvers
 
     if isinstance(maneuvers, Maneuvers):
         return maneuvers

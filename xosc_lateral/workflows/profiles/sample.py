@@ -16,8 +16,7 @@ from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
 from xosc_lateral.files.tables import context_of_table, read_table
-from xosc_lateral.workflows.inputs import several
-from xosc_lateral.workflows.opened import opened
+from xosc_lateral.workflows.opened import opened, several
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,

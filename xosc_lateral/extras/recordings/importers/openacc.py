@@ -28,10 +28,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, true_slices
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rows import true_slices
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.identity import identify

@@ -16,11 +16,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, blocks, rate
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rates import rate
-from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.evidence import of_registration
