@@ -54,7 +54,7 @@ from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_
 from xosc_lateral.extras.detect.tracks import STEP, Scene
 from xosc_lateral.extras.detect.tuning import AtLimits, Views, carried, out_of_fold, read_goal, scored
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
-from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
+from xosc_lateral.extras.recordings.reconstruct import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.files.profiles import read_profile

@@ -139,8 +139,7 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.live.traffic import Moment, Traffic
     from xosc_lateral.extras.loop.call import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.extras.recordings.importers import ImportedDrives, import_drives
-    from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
-    from xosc_lateral.extras.recordings.reconstruct import reconstruct
+    from xosc_lateral.extras.recordings.reconstruct import read_maneuvers, reconstruct
     from xosc_lateral.extras.recordings.reconstruction import Reconstruction
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify

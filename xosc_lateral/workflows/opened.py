@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 from xml.etree import ElementTree
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pa, pd
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.files.held import Held, hold
 from xosc_lateral.files.mapping import MappingLike, as_mapping
@@ -187,8 +188,6 @@ def opened_as_one(stated: InputLike, columns: MappingLike | None = None, name: s
     paths = opened(stated, name)
     if len(paths) == 1:
         return paths[0]
-    import pandas as pd
-
     mapping = as_mapping(columns)
     return _in_memory(pd.concat([read_table(path, mapping) for path in paths], ignore_index=True), name)
 
@@ -219,7 +218,6 @@ def _frame_bytes(frame: InputLike) -> bytes | None:
         frame = frame_of(frame)
     except TypeError:
         return None
-    import pyarrow as pa
     import pyarrow.feather as feather
 
     frame = frame.rename(columns=str).reset_index(drop=True)

@@ -15,7 +15,7 @@ from msgspec import Meta, defstruct, field, structs
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.names import unwritable
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.model.core.base import CoreModel
 from xosc_lateral.drivers.model.core.registry import any_model
 from xosc_lateral.drivers.model.effects import Effect, any_effect

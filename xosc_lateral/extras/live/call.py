@@ -19,7 +19,7 @@ from xosc_lateral.workflows.options import SHARED, declare_options, flag, profil
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
 
 if TYPE_CHECKING:
-    from xosc_lateral.extras.live.scene import SimulatorScene
+    from xosc_lateral.extras.live.loop import SimulatorScene
 
 STATE_COLUMNS = (*RECOGNISED_BY, "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
@@ -63,7 +63,7 @@ def live_esmini(
     """
     from xosc_lateral.extras.live.esmini import EsminiTraffic
     from xosc_lateral.extras.live.esmini_library import open_player
-    from xosc_lateral.extras.live.scene import SimulatorScene
+    from xosc_lateral.extras.live.loop import SimulatorScene
     from xosc_lateral.workflows.conversion.result import Neighbours
 
     chosen = given_profile(profile, folders)
@@ -116,7 +116,7 @@ def live_sumo(
     SUMO's own random seed is as `config` (``.sumocfg``) says; `options` are further words of its command line. Raises
     `SimulationError` in one line.
     """
-    from xosc_lateral.extras.live.scene import SimulatorScene, sumo_network
+    from xosc_lateral.extras.live.loop import SimulatorScene, sumo_network
     from xosc_lateral.extras.live.sumo import SumoTraffic, start
     from xosc_lateral.workflows.conversion.result import Neighbours
 
@@ -207,7 +207,7 @@ class LiveRun(Result):
 
         Raises `SimulationError` if SUMO's network can't be made a road.
         """
-        from xosc_lateral.extras.live.scene import motion_of
+        from xosc_lateral.extras.live.loop import motion_of
         from xosc_lateral.files.osi import SUFFIXES
         from xosc_lateral.world.scenario.controllers import is_named_under_test
 

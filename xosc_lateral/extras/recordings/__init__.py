@@ -15,7 +15,7 @@ VERBS = {
     ),
 }
 CALLS = {
-    "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
+    "read_maneuvers": "xosc_lateral.extras.recordings.reconstruct",
     "reconstruct": "xosc_lateral.extras.recordings.reconstruct",
     "import_drives": "xosc_lateral.extras.recordings.importers",
     "Reconstruction": "xosc_lateral.extras.recordings.reconstruction",

@@ -12,7 +12,8 @@ import numpy as np
 from lxml import etree
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.extras.recordings.reference_line import ReferenceLine
+from xosc_lateral.base.lazy import interpolate
+from xosc_lateral.extras.recordings.lines_from_tracks import ReferenceLine
 from xosc_lateral.files.openscenario.write.build import decimal, sub
 from xosc_lateral.files.output_paths import template_mark
 
@@ -42,9 +43,7 @@ class WrittenLane:
     @classmethod
     def through(cls, kind: str, s: FloatArray, width: FloatArray) -> WrittenLane:
         """A smooth width through values at some s, shape (n,) each. [m]"""
-        from scipy.interpolate import CubicSpline
-
-        spline = CubicSpline(s, np.maximum(width, 0.0))
+        spline = interpolate.CubicSpline(s, np.maximum(width, 0.0))
         return cls(kind, np.column_stack([s[:-1], spline.c[::-1].T]))
 
 

@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.extras.recordings.reference_line import ReferenceLine
+from xosc_lateral.base.lazy import interpolate, spatial
+from xosc_lateral.extras.recordings.lines_from_tracks import ReferenceLine
 from xosc_lateral.extras.recordings.road_file import Connections, WrittenLane, WrittenRoad, curved_plan, roads_xml
 
 PIECE_LENGTH = 5.0  # of a curved reference line: a cubic is off by 2 mm on a radius of 10 m, see `curved_plan` [m]
@@ -166,18 +167,16 @@ def _mirrored(road: WrittenRoad) -> WrittenRoad:
 
 def smooth_line(points: FloatArray) -> ReferenceLine:
     """A line through points whose direction does not jump (Akima's cubics), by its own length."""
-    from scipy.interpolate import Akima1DInterpolator, CubicSpline
-
     points = np.asarray(points[:, :2], dtype=np.float64)
     points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-6]]
     chord = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
     fine = np.linspace(0.0, chord[-1], max(3, int(np.ceil(chord[-1] / SAMPLE_LENGTH)) + 1))
     if len(points) > 2:
-        curve = Akima1DInterpolator(chord, points)(fine)
+        curve = interpolate.Akima1DInterpolator(chord, points)(fine)
     else:
         curve = np.stack([np.interp(fine, chord, points[:, axis]) for axis in (0, 1)], axis=1)
     s = np.r_[0.0, np.cumsum(np.hypot(*np.diff(curve, axis=0).T))]
-    places = CubicSpline(s, curve)
+    places = interpolate.CubicSpline(s, curve)
     return ReferenceLine(float(s[-1]), lambda at, order: np.asarray(places(at, order)), lambda at: 0.0 * at)
 
 
@@ -190,12 +189,10 @@ def _turning(points: FloatArray) -> float:
 
 def _aside(edge: FloatArray, line: ReferenceLine, s: FloatArray, samples: FloatArray) -> FloatArray:
     """How far to the left of a line an edge lies, at its samples, shape as `s`; NaN where the edge is not. [m]"""
-    from scipy.spatial import cKDTree
-
     way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(edge[:, :2], axis=0).T))]
     dense = np.linspace(0.0, way[-1], max(2, int(np.ceil(way[-1] / SAMPLE_LENGTH)) + 1))
     points = np.stack([np.interp(dense, way, edge[:, axis]) for axis in (0, 1)], axis=1)
-    at, aside = line.project(points, s[cKDTree(samples).query(points)[1]])
+    at, aside = line.project(points, s[spatial.cKDTree(samples).query(points)[1]])
     order = np.argsort(at, kind="stable")
     at, aside = at[order], aside[order]
     absent = (s < at[0] - ABSENCE_LENGTH) | (s > at[-1] + ABSENCE_LENGTH)

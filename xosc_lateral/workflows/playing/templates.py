@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from xosc_lateral.files.templates import AnyTemplate
-    from xosc_lateral.files.templates.parameter import Parameter
+    from xosc_lateral.files.templates.template import Parameter
 
 
 def list_templates(name: str | None = None) -> TemplateList:

@@ -11,8 +11,7 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, warnings
-from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Drive
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
 from xosc_lateral.files.tables import context_of_table, read_table

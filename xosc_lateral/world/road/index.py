@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.base.arrays import FloatArray, Int32Array
 from xosc_lateral.base.errors import PlaybackError
+from xosc_lateral.base.lazy import spatial
 from xosc_lateral.world.road.lane_tables import CHUNK_SIZE
 from xosc_lateral.world.road.lanes import DRIVING, Lane, LaneSection
 from xosc_lateral.world.road.positions import LanePositions
@@ -109,9 +110,7 @@ class Samples:
             squared = (x[points, None] - self.x) ** 2 + (y[points, None] - self.y) ** 2
             sample = np.argpartition(squared, k - 1, axis=1)[:, :k]
         else:
-            from scipy.spatial import cKDTree
-
-            tree = cKDTree(np.stack([self.x, self.y], axis=1))
+            tree = spatial.cKDTree(np.stack([self.x, self.y], axis=1))
             sample = tree.query(np.stack([x[points], y[points]], axis=1), k=k)[1].reshape(len(points), k)
         order = np.argsort(self.piece[sample], axis=1)
         sample = np.take_along_axis(sample, order, axis=1)

@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, PlaybackError, UnsupportedElementError
+from xosc_lateral.base.lazy import interpolate
 from xosc_lateral.world.player.paths.base import Path, PathPoint
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
 from xosc_lateral.world.player.simulation import Simulation
@@ -53,12 +54,10 @@ class NurbsPath(Path):
     """A NURBS curve of an order (degree + 1), with as many knots as control points and order together."""
 
     def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:
-        from scipy.interpolate import BSpline  # takes a while to import, and few scenarios have a curve
-
         self.controls = tuple(controls)
         self._knots, self._degree = np.asarray(knots, dtype=np.float64), order - 1
         weighed = np.array([(c.weight * c.x, c.weight * c.y, c.weight) for c in self.controls])
-        self._curve = BSpline(self._knots, weighed, self._degree)
+        self._curve = interpolate.BSpline(self._knots, weighed, self._degree)
         self._parameters, self._line = self._sample()
         super().__init__(self._line.lengths, self._line.times)
 
@@ -104,11 +103,9 @@ class NurbsPath(Path):
 
     def _times(self, parameters: FloatArray, step: float) -> list[float]:
         """Times of the samples: those of the control points where each weighs most, evenly in between."""
-        from scipy.interpolate import BSpline
-
         delta = min(_TANGENT_STEP, step)
         beside = np.r_[parameters[:-1] + delta, parameters[-1] - delta]
-        shares = BSpline.design_matrix(self._inside(beside), self._knots, self._degree).tocsc()
+        shares = interpolate.BSpline.design_matrix(self._inside(beside), self._knots, self._degree).tocsc()
         shares.data = shares.data.round(12)  # of two samples as good as each other the first
         peaks = parameters[np.asarray(shares.argmax(axis=0)).ravel()].tolist()
         times, k = [], 0
