@@ -122,7 +122,7 @@ def with_units(to_frame: Callable[..., pd.DataFrame]) -> Callable[..., pd.DataFr
     return described
 
 
-PAGE_SUFFIXES = (".html", ".htm")
+PAGE_SUFFIXES, PROFILE_SUFFIXES = (".html", ".htm"), (".json",)
 
 
 def write_page(

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import SimulationError
-from xosc_lateral.base.own_clock import LARGEST_HEADING, own_time
-from xosc_lateral.base.segment import Segment
+from xosc_lateral.base.segment import LARGEST_HEADING, Segment, own_time
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import sealed

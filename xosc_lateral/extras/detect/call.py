@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.workflows.opened import (
     DocumentLike,
     HeldPath,
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.detect.observation import Sensor
     from xosc_lateral.extras.detect.scoring import Tally
     from xosc_lateral.extras.detect.sight import Sight
-    from xosc_lateral.files.mapping import MappingLike
 
 
 def _known_sensor(text: str) -> str:
@@ -122,7 +122,6 @@ def detect(
     from xosc_lateral.extras.detect.sight import sight_of
     from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
     from xosc_lateral.extras.detect.tuning import read_goal, tune_all
-    from xosc_lateral.files.mapping import as_mapping
     from xosc_lateral.workflows.batch.call import read_shard
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
 

@@ -13,8 +13,7 @@ import numpy as np
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, OFFSET_LANES, TIME, context_range
 from xosc_lateral.base.names import in_c
-from xosc_lateral.base.own_clock import CLOCK_RATES, CLOCK_SPEEDS, SPEED_SLACK
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.segment import CLOCK_RATES, CLOCK_SPEEDS, MINIMUM_SPEED, SPEED_SLACK
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import actuator
 from xosc_lateral.drivers.model import effects as kinds

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
-from xosc_lateral.base.own_clock import clock_rate
+from xosc_lateral.base.segment import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.esmini_library import OBJECT_STATE, EsminiLibrary, ObjectState, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest

@@ -1,7 +1,7 @@
 """From a driver's curve to where his vehicle is: what leads over to his path, slow driving, moving aside.
 
 A vehicle's path has no corner (`LARGEST_TURN_RATE`): where a maneuver has moved it, its path leads over from there to
-the driver's; below 40 km/h his movement has a slower clock (`base.own_clock`).
+the driver's; below 40 km/h his movement has a slower clock (`base.segment`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.own_clock import LARGEST_HEADING, clock_rate, is_slow, way_of
+from xosc_lateral.base.segment import LARGEST_HEADING, clock_rate, is_slow, way_of
 from xosc_lateral.world.motion.driver_clock import leading_time
 from xosc_lateral.world.motion.trajectory import settle, smoother_step
 from xosc_lateral.world.surroundings.context import STEERING_DURATION

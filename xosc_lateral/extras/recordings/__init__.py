@@ -23,6 +23,6 @@ CALLS = {
 }
 SERVICES = {
     "drives_of": "xosc_lateral.extras.recordings.recordings",
-    "is_left_handed": "xosc_lateral.extras.recordings.sumo",
+    "is_left_handed": "xosc_lateral.extras.recordings.importers.fcd",
     "write_osi": "xosc_lateral.extras.recordings.osi_write",
 }

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xosc_lateral.base.arrays import BLOCK, FloatArray, IntArray, blocks, columns
-from xosc_lateral.base.own_clock import within_heading
+from xosc_lateral.base.segment import within_heading
 from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
 from xosc_lateral.drivers.model.profile import DriverProfile, Maneuvers
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error

@@ -183,8 +183,6 @@ def write_image(
     figure = shown.picture(time)
     if output.suffix.lower() == ".svg":
         return write_atomically(output, marked(figure.svg()))
-    from xosc_lateral.workflows.playing.picture import rasters
-
     (image,) = rasters([figure])
     from PIL.PngImagePlugin import PngInfo
 
@@ -199,8 +197,6 @@ def write_animation(
     scene: str, path: str | Path, *, usual_name: str, inputs: Iterable[Path] = (), force: bool = False
 ) -> Path:
     """Write the whole run as ``.gif`` (extra `pictures`), in real time."""
-    from xosc_lateral.workflows.playing.picture import rasters
-
     output = output_file(path, f"{usual_name}.gif", ANIMATION_SUFFIXES)
     claim([output], inputs, force=force)
     shown = PictureScene(scene)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -19,21 +19,21 @@ from xosc_lateral.base.note import Note, rows_left_out, warnings
 from xosc_lateral.base.texts import counted
 from xosc_lateral.drivers.drives.cleaning import summary_of
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive, cut_runs
+from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.mapping import MappingLike, as_mapping, mapping_of
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.pages.chart import MEASURED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import KeyFigure, Page
+from xosc_lateral.files.profiles import describe_profile
 from xosc_lateral.files.recognised import mapping_text, recognised
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.files.tables import read_table, tables_at
 from xosc_lateral.workflows.opened import opened
 from xosc_lateral.workflows.options import Paths, declare_options
+from xosc_lateral.workflows.profiles.fit import fit, fit_warnings
 from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, given_drives, write_page
-
-if TYPE_CHECKING:
-    from xosc_lateral.drivers.model.profile import DriverProfile
 
 BESIDE = ("left_distance", "right_distance")
 
@@ -91,8 +91,6 @@ def _range(numbers: FloatArray) -> dict[str, float | None]:
 
 def _fitted(read: GivenDrives) -> tuple[DriverProfile | None, str]:
     """A profile of the drives, as far as there is enough of them; else why there is none."""
-    from xosc_lateral.workflows.profiles.fit import fit
-
     try:
         with catch_warnings():
             simplefilter("ignore", UserWarning)
@@ -152,8 +150,6 @@ class Health(Result):
         """What can be fitted to the drives, a line each."""
         if self.profile is None:
             return []
-        from xosc_lateral.files.profiles import describe_profile
-
         lines = [f"a profile, {line}" for line in describe_profile(self.profile).splitlines()[1:2]]
         if self.profile.effects:
             lines.append(f"effects of {', '.join(self.profile.columns)}")
@@ -183,8 +179,6 @@ class Health(Result):
         """Rows left out, what the drives say against themselves, and what `fit` would."""
         if self.read is None or self.profile is None:
             return () if self.read is None else self.read.messages
-        from xosc_lateral.workflows.profiles.fit import fit_warnings
-
         return (*rows_left_out(self.read.left_out), *warnings(fit_warnings(self.profile)))
 
     def __str__(self) -> str:
@@ -218,14 +212,10 @@ class Health(Result):
 
     def plot(self) -> Figure | None:
         """Offsets of the first drives; None: nothing can be read."""
-        from xosc_lateral.workflows.profiles.health import traces
-
         return None if self.read is None else traces(self.read.drives)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the page."""
-        from xosc_lateral.workflows.profiles.health import page_of
-
         drives = self.read.drives if self.read else []
         page = lambda: page_of(self.headline(), self.to_dict(), drives)  # noqa: E731
         return write_page(path, "health.html", page, inputs=self.files, force=force)

@@ -18,13 +18,20 @@ from xosc_lateral.files.profiles import Entry, described, matching, own_path, pr
 from xosc_lateral.files.source import edit_in_place
 from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.profiles.cards import card_page, list_record, list_text
-from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
+from xosc_lateral.workflows.result import (
+    PROFILE_SUFFIXES,
+    PathLike,
+    Paths,
+    ProfileLike,
+    Result,
+    as_paths,
+    given_profile,
+    write_page,
+)
 
 if TYPE_CHECKING:
     from xosc_lateral.drivers.fitting.derive import Derived
     from xosc_lateral.workflows.profiles.comparison_page import ProfileComparison
-
-PROFILE_SUFFIXES = (".json",)
 
 TAGS = flag("--tag", kind=list[str] | None, metavar="TAG", help="Tag to add; may be repeated.")
 METADATA = flag("--set", kind=list[str] | None, read=texts, metavar="FIELD=VALUE",

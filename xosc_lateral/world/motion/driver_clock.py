@@ -13,8 +13,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.own_clock import way_of
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.segment import MINIMUM_SPEED, way_of
 from xosc_lateral.world.motion.look import FRAME_TURN, LATERAL_ACCELERATION, LOOK_STEP
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, distance_driven
