@@ -32,14 +32,6 @@ from laboratory.detectors import drive_table, half_of, in_half, recorded, run_sc
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
 from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
-from xosc_lateral.extras.detect.logistic import (
-    ROW_STRIDE,
-    Logistic,
-    features,
-    fit_regression,
-    rows_to_train_on,
-    train,
-)
 from xosc_lateral.extras.detect.observation import (
     PERFECT_SENSOR,
     Sensor,
@@ -48,6 +40,14 @@ from xosc_lateral.extras.detect.observation import (
     seen_through,
     spectrum_in,
     views_of,
+)
+from xosc_lateral.extras.detect.other_detectors import (
+    ROW_STRIDE,
+    Logistic,
+    features,
+    fit_regression,
+    rows_to_train_on,
+    train,
 )
 from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of

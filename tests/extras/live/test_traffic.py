@@ -16,7 +16,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import sealed
 from xosc_lateral.extras.live.loop import UnderTest
-from xosc_lateral.extras.live.paths import Moves
+from xosc_lateral.extras.live.moment import Moves
 from xosc_lateral.extras.live.traffic import FORMAT, Moment, Traffic
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.motion.driver_clock import LARGEST_TURN_RATE

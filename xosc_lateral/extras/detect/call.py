@@ -117,8 +117,8 @@ def detect(
 
     from xosc_lateral.extras.detect.cut_ins import cut_ins_like
     from xosc_lateral.extras.detect.detection import Detection, count_all
-    from xosc_lateral.extras.detect.logistic import TRAINED_RULE, read_detectors, train_all
     from xosc_lateral.extras.detect.observation import keeping_spectrum, read_sensor, spectrum_in
+    from xosc_lateral.extras.detect.other_detectors import TRAINED_RULE, read_detectors, train_all
     from xosc_lateral.extras.detect.sight import sight_of
     from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
     from xosc_lateral.extras.detect.tuning import read_goal, tune_all

@@ -134,13 +134,9 @@ class FolderBench(NamedTuple):
     rows: tuple[ManifestRow, ...]
 
 
-def _outputs_that_differ(bench: FolderBench) -> float:
-    return float(len(verify(bench.folder, workers=0).failing))
-
-
 FOLDER_MEASURES: Mapping[str, Measure] = {
     "failed_outputs": lambda bench: float(sum(bool(row.error) for row in bench.rows)),
-    "outputs_that_differ": _outputs_that_differ,
+    "outputs_that_differ": lambda bench: float(len(verify(bench.folder, workers=0).failing)),
     "outputs_with_new_contacts": lambda bench: float(sum(map(has_new_contact, bench.rows))),
 }
 

@@ -23,8 +23,7 @@ from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.esmini_library import OBJECT_STATE, EsminiLibrary, ObjectState, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest
 from xosc_lateral.extras.live.loop import Row, UnderTest
-from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
-from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, left_of_gap
+from xosc_lateral.extras.live.moment import CLOCK_TOLERANCE, Moves, OpenDriveRoads, Places, left_of_gap
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario

@@ -23,8 +23,7 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.loop import CATEGORY_OF_CLASS, Row, UnderTest, sumo_entity
-from xosc_lateral.extras.live.moment import Places
-from xosc_lateral.extras.live.paths import Moves
+from xosc_lateral.extras.live.moment import Moves, Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.scenario.entity import Entity
