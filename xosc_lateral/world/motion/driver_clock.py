@@ -1,7 +1,7 @@
 """The driver's clock along a way in its fastest run, and the one bound on how fast movement turns a vehicle.
 
 A path by distance is driven at any speed that an ego allows. Its clock is that of the fastest: what is bounded there is
-bounded everywhere. Live driving has the same bound (`extras.live.paths`).
+bounded everywhere. Live driving has the same bound (`extras.live.moment`).
 """
 
 from __future__ import annotations
