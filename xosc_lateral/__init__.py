@@ -18,7 +18,7 @@ _HOME = {
     "segments": "workflows.playing.call",
     "fit": "workflows.profiles.fit",
     "sample": "workflows.profiles.sample",
-    "evaluate": "workflows.profiles.evaluate",
+    "evaluate": "workflows.profiles.fit",
     "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "read_profile": "workflows.profiles.profiles",
@@ -148,9 +148,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
-    from xosc_lateral.workflows.profiles.evaluate import evaluate
     from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
-    from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.fit import evaluate, fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample

@@ -45,10 +45,6 @@ class Command(Detector):
             raise ValueError("an empty command")
         self.text, self.threshold, self._answer_time = words, threshold, answer_time
 
-    def label(self) -> str:
-        """See `Detector`."""
-        return self.text
-
     def title(self) -> str:
         """See `Detector`."""
         return self.text

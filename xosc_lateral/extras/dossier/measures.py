@@ -22,8 +22,8 @@ from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import convert
 from xosc_lateral.workflows.playing.call import play
 from xosc_lateral.workflows.playing.templates import write_template
-from xosc_lateral.workflows.profiles.evaluate import evaluate
 from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
+from xosc_lateral.workflows.profiles.fit import evaluate
 from xosc_lateral.workflows.result import DrivesLike
 
 TEMPLATES = ("cut-in", "overtake-truck", "dense-traffic")
