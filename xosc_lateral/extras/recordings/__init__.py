@@ -2,13 +2,13 @@
 
 VERBS = {
     "import": (
-        "xosc_lateral.extras.recordings.verbs",
+        "xosc_lateral.extras.recordings.import_verb",
         "Convert recordings into drive tables.",
         "profiles",
         "docs/real_data.md, docs/formats.md",
     ),
     "reconstruct": (
-        "xosc_lateral.extras.recordings.verbs",
+        "xosc_lateral.extras.recordings.reconstruct_verb",
         "Turn a recording into a maneuver-based scenario.",
         "verify",
         "docs/how_to/from_a_recording.md",

@@ -1,4 +1,4 @@
-"""`xosc-lateral import` and `reconstruct`: other people's recordings into drive tables, and into scenarios."""
+"""`xosc-lateral import`: other people's recordings into the standard drive table."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from typer.core import TyperGroup
 import xosc_lateral as xl
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
-from xosc_lateral.cli.words import Mapped, Options, Writing, command, pairs, with_options, write_stdout
+from xosc_lateral.cli.words import Options, Writing, command, pairs, with_options, write_stdout
 from xosc_lateral.extras.recordings.importers import GROUP, IMPORTERS, find_importer
-from xosc_lateral.extras.recordings.settings import ReconstructSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,21 +128,3 @@ _add(
     "import table *.csv --mapping company.toml -o drives.parquet",
     sources="Tables of drives.", metavar="TABLE...",
 )
-
-
-@command(
-    app, "reconstruct", VERBS["reconstruct"],
-    "reconstruct tasi-0.15.4-py3-none-any.whl -o a39/ --from 60 --to 120",
-    "reconstruct tracks.csv --road road.xodr -o out/ --around 17 --host 17 --relative",
-    "convert out/drivers.csv -o twins/ --variants 20",
-)
-def reconstruct(
-    recording: Annotated[Path, typer.Argument(help="Tracks of several vehicles.", show_default=False)],
-    *,
-    output: Annotated[str, typer.Option("--output", "-o", help="Folder to write to.", show_default=False)],
-    mapped: Mapped,
-    settings: Annotated[Options, ReconstructSettings],
-    reply: Writing,
-) -> None:
-    """Turn a recording into maneuvers, its road, and the drivers who drove."""
-    reply.say(xl.reconstruct(recording, output, columns=mapped.mapping(), **settings, force=reply.force))
