@@ -41,14 +41,14 @@ class VariableCondition(Content, frozen=True):
     rule: enums.Rule
 
 
-class NumberCondition(Content, frozen=True):
+class AgainstNumber(Content, frozen=True):
     """Something against a number."""
 
     value: AnyNumber
     rule: enums.Rule
 
 
-class SimulationTimeCondition(NumberCondition, frozen=True):
+class SimulationTimeCondition(AgainstNumber, frozen=True):
     """[s]"""
 
 
@@ -114,7 +114,7 @@ class OffroadCondition(Content, frozen=True):
     duration: float
 
 
-class Measured(NumberCondition, frozen=True, kw_only=True):
+class Measured(AgainstNumber, frozen=True, kw_only=True):
     """A distance, or what is made of one, against a value. `along_route` (1.0) None: not said."""
 
     freespace: No
@@ -136,7 +136,7 @@ class TimeToCollisionCondition(Measured, frozen=True):
     target: str | Position
 
 
-class AccelerationCondition(NumberCondition, frozen=True):
+class AccelerationCondition(AgainstNumber, frozen=True):
     """[m/s2]; `direction` None: the magnitude."""
 
     direction: enums.DirectionalDimension | None = None
@@ -148,7 +148,7 @@ class StandStillCondition(Content, frozen=True):
     duration: float
 
 
-class SpeedCondition(NumberCondition, frozen=True):
+class SpeedCondition(AgainstNumber, frozen=True):
     """[m/s]; `direction` None: the scalar speed."""
 
     direction: enums.DirectionalDimension | None = None
@@ -179,7 +179,7 @@ class DistanceCondition(Measured, frozen=True):
     position: Position
 
 
-class RelativeDistanceCondition(NumberCondition, frozen=True):
+class RelativeDistanceCondition(AgainstNumber, frozen=True):
     """Distance to an entity. [m]"""
 
     entity_ref: EntityRef

@@ -79,7 +79,7 @@ class SpeedProfileAction(Content, frozen=True):
     constraints: DynamicConstraints | None = None
 
 
-class DistanceAction(Content, frozen=True):
+class KeptDistance(Content, frozen=True):
     """Keep a distance [m] to an entity."""
 
     entity_ref: EntityRef
@@ -90,7 +90,7 @@ class DistanceAction(Content, frozen=True):
     constraints: DynamicConstraints | None = None
 
 
-class LongitudinalDistanceAction(DistanceAction, frozen=True):
+class LongitudinalDistanceAction(KeptDistance, frozen=True):
     """Along the road, or a time gap [s]; both None: the present distance."""
 
     time_gap: float | None = None
@@ -140,7 +140,7 @@ class LaneOffsetAction(Content, frozen=True):
     max_lateral_acc: float | None = None
 
 
-class LateralDistanceAction(DistanceAction, frozen=True):
+class LateralDistanceAction(KeptDistance, frozen=True):
     """Across the road; `distance` None: the present one."""
 
     displacement: enums.LateralDisplacement = enums.LateralDisplacement.ANY
