@@ -23,7 +23,7 @@ import xosc_lateral as xl
 from laboratory.agreement import own_rows, reference_rows
 from laboratory.round_trips import BANDS, SETS, planted, powers, wander
 from laboratory.storyboard import Actor, Plot, Vehicle
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.files.profiles import find_profile, read_profile
 from xosc_lateral.files.templates.template import Motorway, Straight

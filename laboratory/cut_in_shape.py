@@ -23,7 +23,7 @@ from sklearn.model_selection import StratifiedKFold, cross_val_predict
 import xosc_lateral as xl
 from xosc_lateral.extras.detect.tracks import in_lanes
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
-from xosc_lateral.extras.recordings.maneuvers import changes_of
+from xosc_lateral.extras.recordings.reconstruct import changes_of
 from xosc_lateral.extras.recordings.recorded import own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.workflows.batch.request import Request, concrete, document_kind

@@ -16,8 +16,7 @@ import numpy as np
 from laboratory.comparison import driver_distances
 from laboratory.library import sliding_snippets, split_in_time
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.drive import Run, all_runs
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run, all_runs
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.files.drives import read_drives
 

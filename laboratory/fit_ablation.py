@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from laboratory.markers import show
 from laboratory.model_choice import LENGTHS, snippets
 from tests.kit.snippet_distances import snippet_distances
-from xosc_lateral.drivers.drives.drive import Run, all_runs
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run, all_runs
 from xosc_lateral.drivers.evaluation.metrics import split_groups
 from xosc_lateral.drivers.fitting.fitting import driver_runs
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import DEFAULT_SETTINGS

@@ -19,7 +19,7 @@ from laboratory.markers import show
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import sample_context
 from xosc_lateral.extras.recordings.importers import dlr_ht
-from xosc_lateral.extras.recordings.reference_line import fit_reference_line
+from xosc_lateral.extras.recordings.lines_from_tracks import fit_reference_line
 from xosc_lateral.files.drives import drives_of_table
 from xosc_lateral.files.profiles import read_profile
 from xosc_lateral.workflows.conversion.driver_context import NEIGHBOURS

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import NORMAL_95
 
 Outcomes = list[dict[str, Any]]
 

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laboratory.markers import show
-from xosc_lateral.extras.recordings import lanes_from_tracks
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.importers import dlr_ht
-from xosc_lateral.extras.recordings.reference_line import fit_reference_line
+from xosc_lateral.extras.recordings.lines_from_tracks import fit_lane_centre, fit_reference_line
 
 FloatArray = NDArray[np.float64]
 SPACINGS = (25.0, 50.0, 100.0, 150.0, 250.0, 400.0)  # [m]
@@ -39,9 +38,7 @@ class Lane:
         found: list[list[FloatArray]] = [[], [], []]
         for k in range(FOLDS):
             use = fold[self.vehicle] != k
-            lane = lanes_from_tracks.fit_lane_centre(
-                self.s[use], self.d[use], height[use], self.stretch[use], knot_spacing=spacing
-            )
+            lane = fit_lane_centre(self.s[use], self.d[use], height[use], self.stretch[use], knot_spacing=spacing)
             residual = self.d[~use] - lane.at(self.s[~use], height[~use])
             change = np.where(np.diff(self.stretch[~use]) == 0, np.diff(residual), np.nan)
             tall = self.height[~use][1:] > 2.5

@@ -27,10 +27,9 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from laboratory.comparison import driver_distances
+from xosc_lateral.base.arrays import significant
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.numbers import significant
-from xosc_lateral.drivers.drives.drive import Drive, Run, all_runs
-from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
+from xosc_lateral.drivers.drives.drive import PASS_BAND_EDGES, STEP, Drive, Run, all_runs
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of
 from xosc_lateral.drivers.evaluation.metrics import snippet_metrics
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, score_profile, scores_to_dict
@@ -43,10 +42,10 @@ from xosc_lateral.drivers.fitting.joined_bands import measured, with_fast_moveme
 from xosc_lateral.drivers.model.profile import POPULATION as ANSWERS
 from xosc_lateral.drivers.model.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.drivers.model.sensor import SensorModel
-from xosc_lateral.extras.detect.band import RECORDED_SPECTRUM
+from xosc_lateral.extras.detect.observation import RECORDED_SPECTRUM
 from xosc_lateral.extras.recordings.importers.dlr_ht import HIGHEST_FREQUENCY, import_dlr_ht
 from xosc_lateral.extras.recordings.importers.openacc import import_openacc
-from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
+from xosc_lateral.extras.recordings.reconstruct import read_maneuvers
 from xosc_lateral.files.drives import drives_of_table, read_drives
 from xosc_lateral.files.source import parsed_hash
 

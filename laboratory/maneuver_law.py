@@ -16,9 +16,9 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.drivers.model.maneuvers import Maneuvers
+from xosc_lateral.drivers.model.profile import Maneuvers
 from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
-from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
+from xosc_lateral.extras.recordings.reconstruct import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.files.profiles import read_profile, write_profile

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.drive import Run, all_runs
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run, all_runs
 from xosc_lateral.drivers.fitting.context_effects import NEIGHBOURS
 from xosc_lateral.drivers.model.effects import Acts, Proximity
 from xosc_lateral.files.drives import read_drives

@@ -31,8 +31,7 @@ from laboratory.markers import show
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives import markings
 from xosc_lateral.drivers.drives.cleaning import RUN
-from xosc_lateral.drivers.drives.drive import Drive, Run, cut_runs
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Drive, Run, cut_runs
 from xosc_lateral.drivers.evaluation.profile_comparison import compare
 from xosc_lateral.drivers.fitting.fitting import driver_runs, fit_population, fit_profile
 from xosc_lateral.drivers.fitting.sensor import likelihood

@@ -21,8 +21,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from laboratory.markers import show
-from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Drive
 from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import fit_autoregressive
 from xosc_lateral.drivers.model.core.autoregressive.model import AutoregressiveModel

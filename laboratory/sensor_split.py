@@ -24,8 +24,7 @@ from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 from examples.driver_simulator.simulator import simulate_drive
 from laboratory.markers import show
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.drive import Drive, Run, cut_runs
-from xosc_lateral.drivers.drives.resampling import resample
+from xosc_lateral.drivers.drives.drive import Drive, Run, cut_runs, resample
 from xosc_lateral.drivers.evaluation.snippets import sample_runs
 from xosc_lateral.drivers.fitting.fitting import fit_runs
 from xosc_lateral.drivers.fitting.sensor.separation import separate

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 import xosc_lateral as xl
-from xosc_lateral.extras.detect.logistic import FEATURES, features, fit_regression
 from xosc_lateral.extras.detect.observation import View
+from xosc_lateral.extras.detect.other_detectors import FEATURES, features, fit_regression
 from xosc_lateral.extras.detect.sources import played_scene
 from xosc_lateral.extras.detect.tracks import EDGE_ROWS, MARGIN_ROWS, STEP, Scene
 from xosc_lateral.workflows.conversion.load import play_scenario

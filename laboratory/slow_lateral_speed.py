@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
-from xosc_lateral.base.own_clock import clock_rate
+from xosc_lateral.base.segment import clock_rate
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.files.profiles import find_profile, read_profile
 

@@ -31,9 +31,17 @@ import xosc_lateral as xl
 from laboratory.detectors import drive_table, half_of, in_half, recorded, run_scenes
 from laboratory.markers import show
 from laboratory.shortcut import area, moments_of
-from xosc_lateral.extras.detect.band import keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.detectors import Detector, LateralSpeed, Learner, TimeToLine, WanderingZone
-from xosc_lateral.extras.detect.logistic import (
+from xosc_lateral.extras.detect.observation import (
+    PERFECT_SENSOR,
+    Sensor,
+    View,
+    keeping_spectrum,
+    seen_through,
+    spectrum_in,
+    views_of,
+)
+from xosc_lateral.extras.detect.other_detectors import (
     ROW_STRIDE,
     Logistic,
     features,
@@ -41,13 +49,12 @@ from xosc_lateral.extras.detect.logistic import (
     rows_to_train_on,
     train,
 )
-from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, View, seen_through, views_of
 from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
 from xosc_lateral.extras.detect.tracks import STEP, Scene
 from xosc_lateral.extras.detect.tuning import AtLimits, Views, carried, out_of_fold, read_goal, scored
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
-from xosc_lateral.extras.recordings.maneuvers import changes_of, law_of
+from xosc_lateral.extras.recordings.reconstruct import changes_of, law_of
 from xosc_lateral.extras.recordings.recorded import place_tracks
 from xosc_lateral.extras.recordings.recordings import read_recording
 from xosc_lateral.files.profiles import read_profile

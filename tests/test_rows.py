@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.base.rows import columns, true_slices
+from xosc_lateral.base.arrays import columns, true_slices
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.cli import main
 from xosc_lateral.workflows.conversion import enrich

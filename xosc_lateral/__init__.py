@@ -18,7 +18,7 @@ _HOME = {
     "segments": "workflows.playing.call",
     "fit": "workflows.profiles.fit",
     "sample": "workflows.profiles.sample",
-    "evaluate": "workflows.profiles.evaluate",
+    "evaluate": "workflows.profiles.fit",
     "check": "workflows.profiles.health",
     "read_drives": "workflows.profiles.fit",
     "read_profile": "workflows.profiles.profiles",
@@ -37,7 +37,7 @@ _HOME = {
     "Playback": "workflows.playing.call",
     "Segments": "workflows.playing.call",
     "Offsets": "workflows.profiles.sample",
-    "Evaluation": "workflows.profiles.evaluate",
+    "Evaluation": "workflows.profiles.evaluation_page",
     "Health": "workflows.profiles.health",
     "XoscLateralError": "base.errors",
     "FormatError": "base.errors",
@@ -132,16 +132,14 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.detect.sight import Sight
     from xosc_lateral.extras.detect.vary import Variations, vary
     from xosc_lateral.extras.dossier.call import Dossier, dossier
-    from xosc_lateral.extras.live.c_driver import export_c
     from xosc_lateral.extras.live.call import LiveRun, live_esmini, live_sumo
     from xosc_lateral.extras.live.esmini import EsminiTraffic
-    from xosc_lateral.extras.live.fmu import export_fmu
+    from xosc_lateral.extras.live.export import export_c, export_fmu
     from xosc_lateral.extras.live.sumo import SumoTraffic
     from xosc_lateral.extras.live.traffic import Moment, Traffic
     from xosc_lateral.extras.loop.call import ClosedLoop, LoopPlan, close_loop, plan_loop
     from xosc_lateral.extras.recordings.importers import ImportedDrives, import_drives
-    from xosc_lateral.extras.recordings.maneuvers import read_maneuvers
-    from xosc_lateral.extras.recordings.reconstruct import reconstruct
+    from xosc_lateral.extras.recordings.reconstruct import read_maneuvers, reconstruct
     from xosc_lateral.extras.recordings.reconstruction import Reconstruction
     from xosc_lateral.workflows.batch.call import BatchResult, convert_many
     from xosc_lateral.workflows.batch.verify import Verification, reproduce, verify
@@ -150,8 +148,8 @@ if TYPE_CHECKING:
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
     from xosc_lateral.workflows.playing.call import Playback, Segments, play, segments
     from xosc_lateral.workflows.playing.templates import list_templates, write_template
-    from xosc_lateral.workflows.profiles.evaluate import Evaluation, evaluate
-    from xosc_lateral.workflows.profiles.fit import fit, read_drives
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
+    from xosc_lateral.workflows.profiles.fit import evaluate, fit, read_drives
     from xosc_lateral.workflows.profiles.health import Health, check
     from xosc_lateral.workflows.profiles.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.workflows.profiles.sample import Offsets, sample

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.base.numbers import significant
+from xosc_lateral.base.arrays import significant
 from xosc_lateral.base.version import __version__
 
 if TYPE_CHECKING:

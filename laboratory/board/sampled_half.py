@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from laboratory.board.half import DRAWS, ENSEMBLE, Half
 from laboratory.board.models.base import LateralModel
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.evaluation.realism import VarianceParts, variance_parts
 from xosc_lateral.drivers.evaluation.snippets import Features, SnippetCondition, Snippets, features_of
 from xosc_lateral.drivers.model.sampled_offsets import segment_of

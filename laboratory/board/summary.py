@@ -13,8 +13,7 @@ from laboratory.board.ranked import SHORT, ranked_numbers
 from laboratory.board.ranking import QUANTILES, agreeing, differing_pairs, kendall_tau, rank_groups, ranks
 from laboratory.board.result import Board, ModelScore, Row
 from laboratory.board.sampled_half import SampledHalf
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 from xosc_lateral.drivers.evaluation.realism import variance_parts
 from xosc_lateral.drivers.evaluation.snippets import BLOCK_SECONDS, FEW_DRIVES, LAGS, autocorrelation_of, resolved_bands
 

@@ -22,8 +22,7 @@ from tests.kit.profiles import REFINED
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.names import in_c, in_c_comment, in_csv, in_json, in_terminal, unwritable
 from xosc_lateral.drivers.model.effects import Acts, Linear
-from xosc_lateral.extras.live.c_driver import export_c
-from xosc_lateral.extras.live.fmu import export_fmu
+from xosc_lateral.extras.live.export import export_c, export_fmu
 from xosc_lateral.files.output_tables import csv_text
 from xosc_lateral.files.profiles import read_profile, write_profile
 

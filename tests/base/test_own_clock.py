@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.base.own_clock import LARGEST_HEADING, clock_rate, own_time, way_of, within_heading
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.segment import LARGEST_HEADING, MINIMUM_SPEED, clock_rate, own_time, way_of, within_heading
 
 
 def test_it_is_real_time_from_40_km_h_on_and_stands_with_the_car() -> None:

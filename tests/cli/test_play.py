@@ -13,7 +13,7 @@ import xosc_lateral as xl
 from tests.kit.stage import Stage, after, event, lane_change, maneuvers, to_lane
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import app
-from xosc_lateral.workflows.batch import guard
+from xosc_lateral.workflows.batch import workers
 from xosc_lateral.workflows.batch.manifest import read_manifest
 
 RUN = CliRunner()
@@ -97,7 +97,7 @@ def test_no_scenario_keeps_a_verb_busy_for_ever(words: str, scenario: Path, monk
             pass
 
     monkeypatch.setattr(xl, "play", busy)
-    monkeypatch.setattr(guard, "JobLimits", partial(guard.JobLimits, timeout=0.1))
+    monkeypatch.setattr(workers, "JobLimits", partial(workers.JobLimits, timeout=0.1))
     result = RUN.invoke(app, [word.format(scenario, scenario) for word in words.split()])
-    assert isinstance(result.exception, guard.JobLimitError)
+    assert isinstance(result.exception, workers.JobLimitError)
     assert str(result.exception) == f"{scenario}: took longer than 0.1 s"

@@ -13,7 +13,7 @@ import numpy as np
 
 from tests.faults.mutants import Rng, mutate
 from tests.faults.reader import NonsenseError, Reader, refusal_of
-from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
+from xosc_lateral.workflows.batch.workers import JobLimitError, JobLimits, within_limits
 
 LIMITS = JobLimits(timeout=30.0, memory=1000.0)
 

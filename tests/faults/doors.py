@@ -19,7 +19,7 @@ from tests.kit.motion import two_roads
 from tests.kit.sumo_run import write_run
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.drivers.model.stream import sealed
-from xosc_lateral.extras.live.fmu import export_fmu
+from xosc_lateral.extras.live.export import export_fmu
 from xosc_lateral.extras.live.stdio import Pipe
 from xosc_lateral.extras.live.sumo import SumoTraffic, start
 from xosc_lateral.extras.live.traffic import FORMAT, Moment, Traffic

@@ -40,20 +40,29 @@ POSITIONS: list[tuple[Position, Position]] = [
         WorldPosition(1.0, -2.0, z=3.0, h=-0.3, p=-0.1, r=0.05, place=HERE),
     ),
     (
-        RelativeWorldPosition("A", 1.0, 2.0, 3.0, TURN, place=HERE),
-        RelativeWorldPosition("A", 1.0, -2.0, 3.0, TURNED, place=HERE),
+        RelativeWorldPosition("A", 1.0, 2.0, 3.0, orientation=TURN, place=HERE),
+        RelativeWorldPosition("A", 1.0, -2.0, 3.0, orientation=TURNED, place=HERE),
     ),
-    (RoadPosition("r", 5.0, 2.0, TURN, place=HERE), RoadPosition("r", 5.0, -2.0, TURNED, place=HERE)),
-    (RelativeRoadPosition("A", 5.0, 2.0, TURN, place=HERE), RelativeRoadPosition("A", 5.0, -2.0, TURNED, place=HERE)),
+    (
+        RoadPosition("r", 5.0, 2.0, orientation=TURN, place=HERE),
+        RoadPosition("r", 5.0, -2.0, orientation=TURNED, place=HERE),
+    ),
+    (
+        RelativeRoadPosition("A", 5.0, 2.0, orientation=TURN, place=HERE),
+        RelativeRoadPosition("A", 5.0, -2.0, orientation=TURNED, place=HERE),
+    ),
     (
         RelativeLanePosition("A", 1, ds=5.0, offset=0.4, place=HERE),
         RelativeLanePosition("A", 1, ds=5.0, offset=-0.4, place=HERE),
     ),
     (GeoPosition(48.0, 9.0, orientation=TURN, place=HERE), GeoPosition(48.0, 9.0, orientation=TURNED, place=HERE)),
-    (RoutePosition(None, None, TURN, place=HERE), RoutePosition(None, None, TURNED, place=HERE)),
     (
-        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, 2.0, TURN, place=HERE),
-        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, -2.0, TURNED, place=HERE),
+        RoutePosition(None, None, orientation=TURN, place=HERE),
+        RoutePosition(None, None, orientation=TURNED, place=HERE),
+    ),
+    (
+        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, 2.0, orientation=TURN, place=HERE),
+        TrajectoryPosition(Trajectory("t", LINE, False, place=HERE), 5.0, -2.0, orientation=TURNED, place=HERE),
     ),
 ]
 
@@ -76,8 +85,8 @@ def test_a_lane_offset_counts_to_the_right_of_the_lane_s_own_direction(
 
 
 def test_relative_to_an_object_is_along_the_world_s_axes_there() -> None:
-    assert mirrored(RelativeObjectPosition("A", 1.0, 2.0, 3.0, TURN, place=HERE)) == RelativeWorldPosition(
-        "A", 1.0, -2.0, 3.0, TURNED, place=HERE
+    assert mirrored(RelativeObjectPosition("A", 1.0, 2.0, 3.0, orientation=TURN, place=HERE)) == RelativeWorldPosition(
+        "A", 1.0, -2.0, 3.0, orientation=TURNED, place=HERE
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.files.openscenario.write.losses import Losses, remove, tidy
+from xosc_lateral.files.openscenario.write.draft import Losses, remove, tidy
 
 STORY = """<OpenSCENARIO>
   <Storyboard>

@@ -15,7 +15,7 @@ from tests.kit.stage import Stage, after, event, lane_change, maneuvers, on_lane
 from xosc_lateral.files.output_tables import COLUMNS, states_csv, states_frame
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.surface import HeaderOffset
+from xosc_lateral.world.road.piecewise import HeaderOffset
 
 
 def table(motion: NominalMotion, network: RoadNetwork) -> list[dict[str, str]]:

@@ -12,8 +12,8 @@ from tests.files.test_openscenario_write import played
 from tests.files.test_versions import PROFILE
 from tests.kit.scenario_files import action, entity, event, made, private, scenario_text, story, write_scenario
 from xosc_lateral.files.openscenario.read import read_scenario
-from xosc_lateral.files.openscenario.write import build, older, versions
-from xosc_lateral.files.openscenario.write.losses import Losses
+from xosc_lateral.files.openscenario.write import build, versions
+from xosc_lateral.files.openscenario.write.draft import Losses
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import separable
 from xosc_lateral.files.openscenario.write.replay import motion_unknown_to
 
@@ -51,8 +51,8 @@ def test_an_override_with_nothing_active_overrides_nothing(content: str, empty: 
     text = (
         f'<OverrideControllerValueAction><Throttle {content}/><Brake active="false"/></OverrideControllerValueAction>'
     )
-    assert older.overrides_nothing(etree.fromstring(text)) is empty
-    assert not older.overrides_nothing(
+    assert versions.overrides_nothing(etree.fromstring(text)) is empty
+    assert not versions.overrides_nothing(
         etree.fromstring('<AssignControllerAction><X active="false"/></AssignControllerAction>')
     )
 
@@ -72,7 +72,7 @@ def test_a_controller_assigned_and_overridden_are_two_actions() -> None:
 
 def test_a_storyboard_without_an_end_gets_one_that_never_comes_where_a_version_asks_for_it() -> None:
     root = etree.fromstring("<OpenSCENARIO><Storyboard><Init/></Storyboard></OpenSCENARIO>")
-    older._complete_3(Losses(root, Path("x.xosc"), "version 1.2", False))
+    versions._complete_3(Losses(root, Path("x.xosc"), "version 1.2", False))
     assert [one.tag for one in root[0]] == ["Init", "StopTrigger"] and len(root[0][1]) == 0
 
 

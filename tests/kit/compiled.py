@@ -14,7 +14,7 @@ import pytest
 
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.c_driver import export_c, identifier, inputs_of
+from xosc_lateral.extras.live.export import export_c, identifier, inputs_of
 
 STRICT = ("-Wall", "-Wextra", "-pedantic", "-Wdouble-promotion", "-Wfloat-equal", "-Werror", "-ffp-contract=off")
 

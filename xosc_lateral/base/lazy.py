@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-__all__ = ["njit", "pd"]
+__all__ = ["interpolate", "njit", "pa", "parquet", "pd", "spatial"]
 
 
 class _Lazy:
@@ -20,8 +20,13 @@ class _Lazy:
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
+    from pyarrow import parquet
+    from scipy import interpolate, spatial
 else:
-    pd = _Lazy("pandas")
+    pd, pa, parquet, interpolate, spatial = map(
+        _Lazy, ("pandas", "pyarrow", "pyarrow.parquet", "scipy.interpolate", "scipy.spatial")
+    )
 
 Body = TypeVar("Body", bound=Callable[..., Any])
 

@@ -10,8 +10,7 @@ from typing import Any, Generic, Literal, Self, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IndexArray
-from xosc_lateral.base.rows import blocks
+from xosc_lateral.base.arrays import FloatArray, IndexArray, blocks
 
 Kind = TypeVar("Kind", bound=np.generic)
 Between = Literal["linear", "angle", "nearest", "across"]

@@ -18,7 +18,7 @@ from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.conversion.settings import ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
-    from xosc_lateral.workflows.batch.guard import JobLimits
+    from xosc_lateral.workflows.batch.workers import JobLimits
     from xosc_lateral.workflows.conversion.conversion import Conversion
 
 # What is said of one option stays together.
@@ -63,9 +63,9 @@ def convert(
     reply: Writing,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
-    from xosc_lateral.workflows.batch.guard import JobLimits
     from xosc_lateral.workflows.batch.request import is_single
-    from xosc_lateral.workflows.inputs import scenarios_at
+    from xosc_lateral.workflows.batch.workers import JobLimits
+    from xosc_lateral.workflows.opened import scenarios_at
 
     _refuse_together(settings)
     options = {**settings, "force": reply.force}
@@ -117,7 +117,7 @@ def _convert_one(
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.osi import osi_wanted
     from xosc_lateral.files.output_paths import STDOUT, claim, label_files, numbered, output_file
-    from xosc_lateral.workflows.batch.guard import for_one
+    from xosc_lateral.workflows.batch.workers import for_one
     from xosc_lateral.workflows.conversion.conversion import osi_files
     from xosc_lateral.workflows.conversion.convert import convert, default_output, output_scenario
     from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside

@@ -37,7 +37,7 @@ app = group_of_verbs()
 
 def _played(scenario: Path, options: Mapping[str, Any]) -> xl.Playback:
     """Within the limits of a batch's scenario: no file keeps a verb busy for ever."""
-    from xosc_lateral.workflows.batch.guard import for_one
+    from xosc_lateral.workflows.batch.workers import for_one
 
     return for_one(lambda path: xl.play(path, **options), scenario)
 

@@ -10,6 +10,8 @@ import typer
 import xosc_lateral as xl
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Printing, Writing, command, say, say_json, write_stdout
+from xosc_lateral.files.output_paths import STDOUT, is_folder, output_file
+from xosc_lateral.files.profiles import facts_of, profile_bytes
 from xosc_lateral.workflows.profiles import profiles
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
@@ -81,9 +83,6 @@ def derive(
 
     The base gives what is not stated. Of a population the typical driver is taken.
     """
-    from xosc_lateral.files.output_paths import STDOUT, output_file
-    from xosc_lateral.files.profiles import profile_bytes
-
     if not options["name"] and output.endswith(".json"):
         options["name"] = output_file(output, "", (".json",)).stem
     made = profiles.derive_profile(base, **options)
@@ -110,8 +109,6 @@ def tag(
     name: Name, *, options: Annotated[Options, profiles.tag_profile], reply: Printing,
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
-    from xosc_lateral.files.profiles import facts_of
-
     changed = profiles.tag_profile(name, **options)
     facts = {**facts_of(changed), "tags": list(changed.metadata.tags)}
     reply.say_words(", ".join(f"{key} {value}" for key, value in facts.items() if value), facts, err=False)
@@ -154,9 +151,6 @@ def export(
     options: Annotated[Options, xl.read_profile], reply: Writing,
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
-    from xosc_lateral.files.output_paths import STDOUT, is_folder
-    from xosc_lateral.files.profiles import profile_bytes
-
     chosen = [xl.read_profile(name, **options) for name in names]
     if len(chosen) > 1 and not is_folder(output):
         raise typer.BadParameter("several profiles go to a folder: -o FOLDER/", param_hint="-o")

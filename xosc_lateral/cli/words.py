@@ -192,8 +192,7 @@ class Writing(Printing):
         from xosc_lateral.files.osi import SUFFIXES, osi_wanted
         from xosc_lateral.files.output_paths import STDOUT, claim, output_file
         from xosc_lateral.files.output_tables import output_suffixes
-        from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
-        from xosc_lateral.workflows.result import PAGE_SUFFIXES
+        from xosc_lateral.workflows.result import PAGE_SUFFIXES, PROFILE_SUFFIXES
 
         suffixes = {"page": PAGE_SUFFIXES, "trace": SUFFIXES, "profile": PROFILE_SUFFIXES, "mapping": (".toml",)}
         paths = {

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.lazy import pa, parquet, pd
 from xosc_lateral.base.names import in_csv
 from xosc_lateral.base.version import __version__
 from xosc_lateral.files.atomic import together, write_atomically
@@ -50,9 +50,6 @@ def write_table(
     """As `write_frame`, for tables that have a CSV of their own; whole or not at all."""
     name = path.name.lower()
     if name.endswith(PARQUET):
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
         plain = frame().copy(deep=False)
         plain.attrs = {}  # which some releases of pyarrow write
         for name in plain.columns if len(plain) else ():
@@ -60,7 +57,7 @@ def write_table(
                 plain[name] = plain[name].map(canonical_json)
         table, buffer = pa.Table.from_pandas(plain, preserve_index=False), io.BytesIO()
         metadata = {**(table.schema.metadata or {}), METADATA_KEY: canonical_json(stamped(provenance)).encode()}
-        pq.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
+        parquet.write_table(table.replace_schema_metadata(metadata), buffer, compression="zstd")
         write_atomically(path, buffer.getvalue())
         return
     data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)

@@ -16,7 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError, meant_for
-from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.lazy import pa, parquet, pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.model.plausibility import first_implausible, implausible
@@ -198,8 +198,6 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def _zstd(file: IO[bytes]) -> Any:
-    import pyarrow as pa
-
     return pa.CompressedInputStream(pa.PythonFile(file, mode="r"), "zstd")
 
 
@@ -213,8 +211,6 @@ def frame_of(table: Any) -> pd.DataFrame:
     if isinstance(table, dict) and not all(np.isscalar(each) for each in table.values()):
         table = pd.DataFrame(table)
     elif not isinstance(table, pd.DataFrame) and hasattr(table, "__arrow_c_stream__"):
-        import pyarrow as pa
-
         table = pa.table(table).to_pandas()
     elif not isinstance(table, pd.DataFrame) and hasattr(table, "__dataframe__"):
         table = pd.api.interchange.from_dataframe(table)
@@ -276,12 +272,11 @@ def read_arrow(path: Path, columns: Sequence[str] | None = None, otherwise: str 
     Raises `FormatError`: it is none, or beyond `limits`; `otherwise`: what it is not where it lacks a column.
     """
     import pyarrow.feather as feather
-    import pyarrow.parquet as pq
 
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
         if path.name.lower().endswith(FEATHER):
             return _of_cells(feather.read_table(source.file, columns, memory_map=False), source)
-        file = pq.ParquetFile(source.file)
+        file = parquet.ParquetFile(source.file)
         about, known = file.metadata, file.schema_arrow.names
         if missing := [name for name in columns or () if name not in known]:
             raise FormatError(f"no column {missing[0]!r}: {otherwise}", path=path)

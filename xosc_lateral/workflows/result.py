@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.note import Note, Telling, rows_left_out, warnings
 from xosc_lateral.base.segment import CONTEXT_UNITS
+from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import parsed_hash, parsed_hashes
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike
 from xosc_lateral.workflows.options import paths as as_paths
@@ -73,7 +75,6 @@ class Result(Telling, ABC):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance, whole or not at all."""
-        from xosc_lateral.files.output_paths import claim, output_file
         from xosc_lateral.files.output_tables import output_suffixes, write_table
 
         output = output_file(path, self.usual_table, output_suffixes())
@@ -121,16 +122,13 @@ def with_units(to_frame: Callable[..., pd.DataFrame]) -> Callable[..., pd.DataFr
     return described
 
 
-PAGE_SUFFIXES = (".html", ".htm")
+PAGE_SUFFIXES, PROFILE_SUFFIXES = (".html", ".htm"), (".json",)
 
 
 def write_page(
     path: PathLike, usual_name: str, html: Callable[[], str], *, inputs: Iterable[Path] = (), force: bool = False
 ) -> Path:
     """Write an HTML page, if need be into a folder; made only if it may be written there."""
-    from xosc_lateral.files.atomic import write_atomically
-    from xosc_lateral.files.output_paths import claim, output_file
-
     output = output_file(path, usual_name, PAGE_SUFFIXES)
     claim([output], inputs, force=force)
     return write_atomically(output, html())
@@ -229,8 +227,7 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None, road: P
     from xosc_lateral.drivers.drives.drive import Drive
     from xosc_lateral.files.drives import read_drives
     from xosc_lateral.files.tables import tables_at
-    from xosc_lateral.workflows.inputs import several
-    from xosc_lateral.workflows.opened import opened, opened_as_one
+    from xosc_lateral.workflows.opened import opened, opened_as_one, several
 
     items, lost = several(drives), Counter[str]()
     label = "DataFrame" if len(items) == 1 else "DataFrame {}"

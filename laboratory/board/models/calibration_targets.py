@@ -12,8 +12,7 @@ from laboratory.board.models.base import LateralModel
 from laboratory.board.ranked import LONG, SHORT, ranked_numbers
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 from xosc_lateral.drivers.evaluation.snippets import (
     Features,
     SnippetCondition,

@@ -18,8 +18,7 @@ from laboratory.board.models.batch import SegmentBatch
 from laboratory.board.models.calibration import Bounds, calibrate
 from laboratory.board.models.calibration_targets import distance_to, targets_of
 from laboratory.board.models.simulated import SimulatedModel
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 
 FloatArray = NDArray[np.float64]
 

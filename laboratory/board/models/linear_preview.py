@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from laboratory.board.models.batch import SegmentBatch
 from laboratory.board.models.simulated import SimulatedModel, driver_means_of
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 
 FloatArray = NDArray[np.float64]
 

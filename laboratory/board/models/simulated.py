@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from laboratory.board.models.batch import SegmentBatch, batch_of
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.errors import XoscLateralError
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 
 FloatArray = NDArray[np.float64]
 

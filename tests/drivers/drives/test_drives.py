@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.drive import PAPER_RULES, Drive, all_runs, cut_runs, whole_run
-from xosc_lateral.drivers.drives.resampling import STEP, average, resample
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, STEP, Drive, all_runs, average, cut_runs, resample, whole_run
 
 
 def jittered(seconds: float, rate: float, rng: np.random.Generator) -> np.ndarray:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from tests.drivers.drives.test_drives import drive, jittered
-from xosc_lateral.drivers.drives.drive import Drive, Run, cut_runs
-from xosc_lateral.drivers.drives.resampling import STEP, average, nearest, resample
+from xosc_lateral.drivers.drives.drive import STEP, Drive, Run, average, cut_runs, nearest, resample
 
 
 @pytest.fixture(scope="module")

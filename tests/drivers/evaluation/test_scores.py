@@ -11,8 +11,7 @@ from scipy.stats import wasserstein_distance
 from laboratory.comparison import compare_profiles, driver_distances
 from tests.kit.snippet_distances import snippet_distances
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 from xosc_lateral.drivers.evaluation.lane_keeping import figures_of, margins
 from xosc_lateral.drivers.evaluation.metrics import (
     METRICS,

@@ -12,7 +12,7 @@ from scipy.stats import binomtest, linregress
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.drivers.fitting.maneuvers import LEAST_CHANGES, MeasuredChanges, fit_maneuvers
-from xosc_lateral.drivers.model.maneuvers import Figure, Maneuvers
+from xosc_lateral.drivers.model.profile import Figure, Maneuvers
 
 ALONE, BEHIND, HOURS, GIVEN_UP = 17, 23, 12.5, 6
 

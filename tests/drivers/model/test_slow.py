@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.kit.profiles import simulated_profile
-from xosc_lateral.base.own_clock import LARGEST_HEADING, own_time
-from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
+from xosc_lateral.base.segment import LARGEST_HEADING, MINIMUM_SPEED, Segment, own_time
 from xosc_lateral.drivers.model.sampling import sample_offsets
 
 STEP = 0.2

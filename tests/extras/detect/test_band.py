@@ -10,7 +10,7 @@ import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, track
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.band import RECORDED_SPECTRUM, SensorBand, band_of, keeping_spectrum, spectrum_in
+from xosc_lateral.extras.detect.observation import RECORDED_SPECTRUM, SensorBand, band_of, keeping_spectrum, spectrum_in
 from xosc_lateral.extras.detect.tracks import STEP
 from xosc_lateral.files.profiles import read_profile
 

@@ -15,9 +15,9 @@ import xosc_lateral as xl
 from tests.kit.lane_tracks import lane_change, scene, track
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.command import Command
 from xosc_lateral.extras.detect.detectors import WanderingZone
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, Sensor, views_of
+from xosc_lateral.extras.detect.other_detectors import Command
 from xosc_lateral.extras.detect.scoring import Tally
 from xosc_lateral.extras.detect.sources import SourceSettings, sources_of
 from xosc_lateral.extras.detect.tracks import STEP

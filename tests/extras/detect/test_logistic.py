@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 
 from tests.kit.lane_tracks import lane_change, scene, track, weave
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.extras.detect.logistic import RIDGE_PENALTY, Logistic, features, fit_regression, train
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, views_of
+from xosc_lateral.extras.detect.other_detectors import RIDGE_PENALTY, Logistic, features, fit_regression, train
 from xosc_lateral.extras.detect.scoring import Tally
 
 TIME = 0.1 * np.arange(900)

@@ -12,8 +12,7 @@ from jsonschema import Draft202012Validator
 import xosc_lateral as xl
 from tests.kit.lane_tracks import WIDTH, scene, track
 from xosc_lateral.cli import main
-from xosc_lateral.extras.detect.sight import moments_of
-from xosc_lateral.extras.detect.visibility import Boxes, points_seen, visible_share
+from xosc_lateral.extras.detect.sight import Boxes, moments_of, points_seen, visible_share
 
 SCHEMA = Path(__file__).parents[3] / "docs" / "schemas" / "detect-sight.json"
 LENGTH, AHEAD = 4.6, 1.4  # of the kit's vehicles; their middle before the reference point

@@ -33,9 +33,8 @@ from xosc_lateral.drivers.model.profile import DriverProfile, Provenance
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.seeds import child
 from xosc_lateral.drivers.model.stream import OffsetStream
-from xosc_lateral.extras.live.c_driver import c_sources, export_c
 from xosc_lateral.extras.live.c_numbers import numbers_of
-from xosc_lateral.extras.live.fmu import export_fmu
+from xosc_lateral.extras.live.export import c_sources, export_c, export_fmu
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.profiles import read_profile, write_profile
 

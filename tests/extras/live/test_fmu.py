@@ -300,7 +300,7 @@ def test_a_unit_is_the_same_bytes_each_time_and_without_a_compiler_has_its_sourc
     compiler()
     first, again = (exported("3.0", tmp_path / name).read_bytes() for name in ("a.fmu", "b.fmu"))
     assert first == again
-    monkeypatch.setattr("xosc_lateral.extras.live.fmu.HOST_COMPILERS", ("no such compiler",))
+    monkeypatch.setattr("xosc_lateral.extras.live.export.HOST_COMPILERS", ("no such compiler",))
     assert xl.export_fmu(xl.read_profile("motorway"), tmp_path / "bare.fmu") == ()
     names = zipfile.ZipFile(tmp_path / "bare.fmu").namelist()
     assert "sources/fmi.c" in names and not any(name.startswith("binaries") for name in names)
@@ -338,7 +338,7 @@ def test_a_compiler_that_is_not_there_or_fails_is_told_in_a_line_and_nothing_is_
     ],
 )
 def test_platforms_are_called_as_the_standard_has_them(machine: str, folders: tuple[str, str, str]) -> None:
-    from xosc_lateral.extras.live.fmu import _platform
+    from xosc_lateral.extras.live.export import _platform
 
     assert (_platform(machine, "2")[0], *_platform(machine, "3")) == folders
 

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from tests.kit.upsampled import upsample
 from xosc_lateral.base.errors import SimulationError
-from xosc_lateral.base.own_clock import LARGEST_HEADING, own_time
-from xosc_lateral.base.segment import Segment
+from xosc_lateral.base.segment import LARGEST_HEADING, Segment, own_time
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets
 from xosc_lateral.drivers.model.stream import sealed
-from xosc_lateral.extras.live.paths import Moves
+from xosc_lateral.extras.live.loop import UnderTest
+from xosc_lateral.extras.live.moment import Moves
 from xosc_lateral.extras.live.traffic import FORMAT, Moment, Traffic
-from xosc_lateral.extras.live.under_test import UnderTest
 from xosc_lateral.workflows.profiles.profiles import read_profile
 from xosc_lateral.world.motion.driver_clock import LARGEST_TURN_RATE
 

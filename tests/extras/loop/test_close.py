@@ -22,7 +22,7 @@ from xosc_lateral.drivers.fitting.fitting import fit_profile
 from xosc_lateral.drivers.model.effects import Linear, Product
 from xosc_lateral.drivers.model.effects.ends import ends_of
 from xosc_lateral.extras.loop.close import NO_WORSE, Finding, LoopResult, close_loop
-from xosc_lateral.extras.loop.loop_json import loop_record
+from xosc_lateral.extras.loop.loop_report import loop_record
 from xosc_lateral.files.drives import read_drives
 
 pytestmark = pytest.mark.pages

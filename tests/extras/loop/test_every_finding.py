@@ -31,7 +31,7 @@ from xosc_lateral.drivers.model.effects.shapes import (
 from xosc_lateral.extras.loop import close, held_out, selection
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
-from xosc_lateral.extras.loop.loop_json import loop_record
+from xosc_lateral.extras.loop.loop_report import loop_record
 from xosc_lateral.extras.loop.loop_words import verdict
 from xosc_lateral.extras.loop.model import Fitted, Outcome, Term, fit_model
 from xosc_lateral.extras.loop.residual import simulated_runs

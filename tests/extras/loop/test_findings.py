@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import NORMAL_95
 from xosc_lateral.drivers.model.effects import Step
 from xosc_lateral.extras.loop.close import _finding, agreeing, describe_finding
 from xosc_lateral.extras.loop.core_model import TIMES_S, DriverVariance, SpectrumShape

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from xosc_lateral.extras.loop.gapped_spectrum import MANY_SEGMENTS, gapped_spectrum
+from xosc_lateral.extras.loop.loop_curves import MANY_SEGMENTS, gapped_spectrum
 
 STEP, SEGMENT = 0.2, 256
 

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import next_fast_len
 
-from xosc_lateral.drivers.drives.drive import CutRules, Drive
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, CutRules, Drive
 from xosc_lateral.extras.loop.gridding import circular_columns, grid_drives
 
 PAD, MULTIPLE = 75, 5

@@ -42,8 +42,7 @@ from xosc_lateral.extras.loop.loop_figures import (
     effect_figure,
     residual_figure,
 )
-from xosc_lateral.extras.loop.loop_json import column_record, finding_record, finite, loop_record
-from xosc_lateral.extras.loop.loop_page import loop_page
+from xosc_lateral.extras.loop.loop_report import column_record, finding_record, finite, loop_page, loop_record
 from xosc_lateral.extras.loop.loop_words import (
     finding_sentence,
     loop_text,

@@ -13,7 +13,7 @@ from tests.kit.profiles import as_drive
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.extras.loop.close import LoopResult, close_loop
-from xosc_lateral.extras.loop.loop_json import loop_record
+from xosc_lateral.extras.loop.loop_report import loop_record
 from xosc_lateral.extras.loop.loop_words import outcome
 
 pytestmark = pytest.mark.pages

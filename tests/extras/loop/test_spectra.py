@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.extras.loop.gapped_spectrum import gapped_spectrum
+from xosc_lateral.extras.loop.loop_curves import gapped_spectrum
 
 
 def test_the_spectrum_of_white_noise_is_flat_and_holds_its_variance() -> None:

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.resampling import in_digits
+from xosc_lateral.drivers.drives.drive import Drive, in_digits
 from xosc_lateral.drivers.model.effects import Acts, Linear
 from xosc_lateral.extras.loop.autocorrelation import moving_sum, positions_in_run
 from xosc_lateral.extras.loop.timeline import (

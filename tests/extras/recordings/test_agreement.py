@@ -13,7 +13,7 @@ from tests.kit.doors import STEP, fcd, highd, osi_trace
 from tests.kit.motion import entity_context
 from tests.kit.stage import lanes, line, map_of, road, section
 from xosc_lateral import import_drives, reconstruct
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.arrays import rate
 from xosc_lateral.drivers.drives.lane_changes import RATE_WINDOW, Course
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, views_of
 from xosc_lateral.extras.detect.sources import SourceSettings, sources_of

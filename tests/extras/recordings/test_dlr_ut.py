@@ -10,8 +10,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral import import_drives, reconstruct
-from xosc_lateral.extras.recordings.importers.dlr_ut import CLASSES, COLUMNS
-from xosc_lateral.extras.recordings.streams import lanes_of_streams, streams
+from xosc_lateral.extras.recordings.importers.dlr_ut import CLASSES, COLUMNS, lanes_of_streams, streams
 
 STEP, STOP, CYCLE = 0.1, 80.0, 60.0  # [s], place of the stop line [m], of the light [s]
 START = pd.Timestamp("2023-09-24 12:00:00+00:00")

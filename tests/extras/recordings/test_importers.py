@@ -22,9 +22,8 @@ from xosc_lateral.extras.recordings.importers import ImportedDrives
 from xosc_lateral.extras.recordings.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.extras.recordings.importers.levelx import import_levelx
 from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE
-from xosc_lateral.extras.recordings.lanes_from_tracks import fit_lane_centre
+from xosc_lateral.extras.recordings.lines_from_tracks import fit_lane_centre, fit_reference_line
 from xosc_lateral.extras.recordings.neighbours import find_neighbours
-from xosc_lateral.extras.recordings.reference_line import fit_reference_line
 from xosc_lateral.files.output_tables import METADATA_KEY
 
 # ---- neighbours and cuts ---------------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.extras.recordings.lateral import SHAPES, lateral_plan
+from xosc_lateral.extras.recordings.recorded import SHAPES, lateral_plan
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.scenario.enums import DynamicsShape
 

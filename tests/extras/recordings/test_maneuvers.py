@@ -16,8 +16,8 @@ from examples.driver_simulator import simulate_drive
 from tests.extras.recordings.test_importers_tracks import WIDTH, two_lanes_each_way, world
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.cli import main
-from xosc_lateral.drivers.model.maneuvers import Maneuvers
-from xosc_lateral.extras.recordings.maneuvers import BEFORE, read_maneuvers
+from xosc_lateral.drivers.model.profile import Maneuvers
+from xosc_lateral.extras.recordings.reconstruct import BEFORE, read_maneuvers
 from xosc_lateral.files.openscenario.distribution import read_distribution
 
 XSD = Path(__file__).resolve().parents[2] / "data/xsd/OpenSCENARIO-1.2.0.xsd"

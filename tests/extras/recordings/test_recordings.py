@@ -9,9 +9,9 @@ import pytest
 
 from tests.extras.recordings.test_importers import _dlr_recording
 from tests.kit.motion import LANE_WIDTH, two_roads
+from xosc_lateral.extras.recordings.lines_from_tracks import ReferenceLine
 from xosc_lateral.extras.recordings.recorded import RecordedTrack, own_lateral, place_tracks
 from xosc_lateral.extras.recordings.recordings import format_of, read_recording
-from xosc_lateral.extras.recordings.reference_line import ReferenceLine
 from xosc_lateral.extras.recordings.road_file import WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.world.motion.nominal import made_vehicle

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.extras.recordings.reference_line import fit_reference_line
+from xosc_lateral.extras.recordings.lines_from_tracks import fit_reference_line
 from xosc_lateral.world.road.geometry import simplify
 
 RADIUS = 4000.0

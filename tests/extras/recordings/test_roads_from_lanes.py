@@ -11,7 +11,7 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
+from xosc_lateral.extras.recordings.road_file import DrivenLane, roads_of_lanes
 from xosc_lateral.files.opendrive.reader import parse_opendrive
 
 WIDTH, RADIUS = 3.2, 60.0

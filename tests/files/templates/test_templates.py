@@ -15,7 +15,7 @@ from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.cli import main
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.templates import TEMPLATES, Template, find_template
-from xosc_lateral.files.templates.parameter import Number
+from xosc_lateral.files.templates.template import Number
 
 XSD = Path(__file__).resolve().parents[2] / "data" / "xsd"
 NAMES = [template.name for template in TEMPLATES]

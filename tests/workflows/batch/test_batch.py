@@ -20,10 +20,10 @@ from tests.kit.fake_converter import convert, convert_and_log
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.source import file_hash
 from xosc_lateral.workflows.batch.batch import STATE_FOLDER, BatchStoppedError, JobOutcome, JobState, convert_many
-from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Job, plan_batch
 from xosc_lateral.workflows.batch.journal import FolderInUseError, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, TIMINGS, ManifestRow, read_manifest
+from xosc_lateral.workflows.batch.workers import JobLimits
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
 ROOT = Path(__file__).resolve().parents[3]

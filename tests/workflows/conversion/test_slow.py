@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.kit.motion import STEP, drive, entity, together, two_roads
-from xosc_lateral.base.own_clock import LARGEST_HEADING
+from xosc_lateral.base.segment import LARGEST_HEADING
 from xosc_lateral.files.profiles import find_profile, read_profile
 from xosc_lateral.files.templates import find_template
 from xosc_lateral.workflows.conversion.convert import convert

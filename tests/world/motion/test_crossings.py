@@ -12,7 +12,7 @@ import xosc_lateral as xl
 from tests.kit.scenario_files import entity, private, scenario_text, speed_action, teleport, write_scenario
 from tests.workflows.conversion.test_vehicle_under_test import CHANGE, EXTERNAL
 from tests.world.scenario.test_under_test import at, event, stories
-from xosc_lateral.extras.recordings.lateral import Rough, fit_transition
+from xosc_lateral.extras.recordings.recorded import Rough, fit_transition
 from xosc_lateral.workflows.conversion.page import conversion_page
 from xosc_lateral.workflows.conversion.result import EntityResult, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertSettings

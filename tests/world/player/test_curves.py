@@ -14,8 +14,8 @@ from scipy.integrate import quad
 from scipy.special import fresnel
 
 from xosc_lateral.world.player.paths.base import nearest_s
-from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
+from xosc_lateral.world.player.paths.registry import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.road.positions import difference, is_forward, wrap
 
 finite = st.floats(-50.0, 50.0)

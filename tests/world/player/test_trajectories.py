@@ -28,8 +28,8 @@ from tests.kit.stage import (
 )
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.player.paths.curves import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 from xosc_lateral.world.player.paths.polyline import Corner, PolylinePath, fill_times, merge_close
+from xosc_lateral.world.player.paths.registry import ClothoidPath, Control, NurbsPath, TimedClothoid, clamped_knots
 
 EGO = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0)}
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.world.road.surface import HeaderOffset
+from xosc_lateral.world.road.piecewise import HeaderOffset
 
 far = st.floats(-1e6, 1e6)
 turn = st.floats(-10.0, 10.0)

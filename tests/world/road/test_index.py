@@ -10,8 +10,8 @@ import pytest
 from tests.kit.places import VALID, hand_written, random_places
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.files.opendrive.reader import read_opendrive
+from xosc_lateral.world.road.index import BRUTE_FORCE
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.samples import BRUTE_FORCE
 
 # Elements of these files are far apart on purpose: jumps have no inverse.
 TORN = {"clothoids", "arcs"}

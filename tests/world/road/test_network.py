@@ -14,8 +14,7 @@ import pytest
 from tests.kit.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive
-from xosc_lateral.world.road.piecewise import PiecewiseCubic
-from xosc_lateral.world.road.surface import Surface
+from xosc_lateral.world.road.piecewise import PiecewiseCubic, Surface
 
 NAMES = sorted(path.stem for path in VALID.glob("*.xodr"))
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, true_slices
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import DRIVE_SPAN, TIME
-from xosc_lateral.base.rows import true_slices
 from xosc_lateral.drivers.drives.drive import MAX_GAP, Drive
 from xosc_lateral.drivers.drives.evidence import UNIT_SIZES, of_clock
 from xosc_lateral.drivers.drives.markings import both_markings

@@ -19,8 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rates import white_noise
+from xosc_lateral.base.arrays import FloatArray, IntArray, white_noise
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 
 LEAST_JUMPS = 2  # lane changes that say the same

@@ -17,8 +17,8 @@ from enum import Enum
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.smoothing import filtered as filtered
-from xosc_lateral.base.smoothing import mirrored as mirrored
+from xosc_lateral.base.arrays import filtered as filtered
+from xosc_lateral.base.arrays import mirrored as mirrored
 
 LEAST_ATTENUATION, GREAT_ATTENUATION = 21.0, 50.0
 """Of a rectangular window, shape 0, where Kaiser's formulas begin, and where they change. [dB]"""

@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, true_slices
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rows import true_slices
 
 CLOCK_BACK = 1.0  # a clock that goes back by more began again; messages overtake one another by less [s]
 UNORDERED = 0.05  # clocks that go back in more of the rows say that these are in no order [-]

@@ -8,9 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rates import fitted_rate, rate, white_noise
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, fitted_rate, rate, true_slices, white_noise
 from xosc_lateral.base.track import lane_levels
 
 SETTLED_OFFSET = 0.7  # nobody has settled in a lane who is farther from its centre: 1.8 m touch a marking at 0.95 m [m]

@@ -23,10 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.numbers import MAD_TO_SD
-from xosc_lateral.drivers.drives.drive import MAX_GAP, MarkingShares, lane_steps
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.base.arrays import MAD_TO_SD, BoolArray, FloatArray, IntArray
+from xosc_lateral.drivers.drives.drive import MAX_GAP, STEP, MarkingShares, lane_steps
 
 DEGREES = 4.0
 """Of freedom of the views' errors. [-]"""

@@ -7,10 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.numbers import NORMAL_95
-from xosc_lateral.base.rates import rate
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import NORMAL_95, FloatArray, rate, true_slices
 from xosc_lateral.drivers.drives.drive import HALF_WIDTH
 from xosc_lateral.drivers.evaluation.metrics import free_runs
 from xosc_lateral.drivers.model.profile import DriverProfile

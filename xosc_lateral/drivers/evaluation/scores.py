@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, all_significant, significant
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.evaluation import spectra
 from xosc_lateral.drivers.evaluation.lane_keeping import UNITS, Margins, margins

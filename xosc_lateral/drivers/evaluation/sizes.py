@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IndexArray
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import NORMAL_95, FloatArray, IndexArray
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.fitting.regression import cluster_sums
 

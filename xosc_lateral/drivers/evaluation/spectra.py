@@ -19,9 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.numbers import NORMAL_95
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import NORMAL_95, FloatArray, true_slices
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms, tapered_powers
 

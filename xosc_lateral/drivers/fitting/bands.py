@@ -26,12 +26,10 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.base.numbers import all_significant, significant
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.drivers.drives.drive import STEP, Run
 from xosc_lateral.drivers.drives.filters import Detrend, filtered, low_pass_between, periodograms
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     FitSettings,
     coarse_power,

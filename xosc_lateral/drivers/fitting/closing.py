@@ -18,11 +18,9 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.numbers import significant
-from xosc_lateral.drivers.drives.drive import Run
+from xosc_lateral.base.arrays import FloatArray, significant
+from xosc_lateral.drivers.drives.drive import PASS_BAND_EDGES, STEP, Run
 from xosc_lateral.drivers.drives.filters import tapered_powers
-from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
 from xosc_lateral.drivers.evaluation.look_words import ENTRIES, LACKING, NUMBERS, ZONE
 from xosc_lateral.drivers.evaluation.spectra import slow_movement

@@ -19,11 +19,9 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace as with_fields
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, all_significant
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.numbers import all_significant
-from xosc_lateral.drivers.drives.drive import Run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Run
 from xosc_lateral.drivers.fitting.regression import autoregressive_least_squares, random_effects_least_squares
 from xosc_lateral.drivers.model.core.autoregressive.parameters import split_bands
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity

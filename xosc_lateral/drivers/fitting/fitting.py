@@ -8,13 +8,11 @@ from dataclasses import replace as with_fields
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, significant
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.numbers import significant
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.base.version import __version__
-from xosc_lateral.drivers.drives.drive import PAPER_RULES, CutRules, Drive, Run, all_runs
-from xosc_lateral.drivers.drives.resampling import STEP, resample
+from xosc_lateral.drivers.drives.drive import PAPER_RULES, STEP, CutRules, Drive, Run, all_runs, resample
 from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.sizes import sizes_of_runs
 from xosc_lateral.drivers.fitting import closing

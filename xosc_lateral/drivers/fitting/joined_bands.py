@@ -7,11 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, significant
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.numbers import significant
-from xosc_lateral.drivers.drives.drive import Drive, Run
-from xosc_lateral.drivers.drives.resampling import PASS_BAND_EDGES, STEP
+from xosc_lateral.drivers.drives.drive import PASS_BAND_EDGES, STEP, Drive, Run
 from xosc_lateral.drivers.fitting.bands import (
     ROLL_OFF,
     SPLIT_AT,

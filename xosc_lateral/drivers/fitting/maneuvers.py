@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import NORMAL_95, BoolArray, FloatArray, all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
-from xosc_lateral.drivers.model.maneuvers import Figure, Maneuvers, Spread
+from xosc_lateral.drivers.model.profile import Figure, Maneuvers, Spread
 
 DIGITS = 4
 """Significant digits of a figure: its error is far above. [-]"""

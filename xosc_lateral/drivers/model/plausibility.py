@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, smoothed
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
-from xosc_lateral.base.smoothing import smoothed
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect
 
 if TYPE_CHECKING:

@@ -15,8 +15,7 @@ import numpy as np
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.drive import CutRules, Drive, Run, all_runs, cut_runs, whole_run
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, CutRules, Drive, Run, all_runs, cut_runs, whole_run
 from xosc_lateral.drivers.model.plausibility import check_offsets
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import sample_offsets

@@ -14,8 +14,7 @@ import msgspec
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.own_clock import is_slow, ticks_of, within_heading
-from xosc_lateral.base.segment import MINIMUM_SPEED, Segment
+from xosc_lateral.base.segment import MINIMUM_SPEED, Segment, is_slow, ticks_of, within_heading
 from xosc_lateral.drivers.model.core.base import CoreStream, Start
 from xosc_lateral.drivers.model.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.drivers.model.effects.base import step_of
@@ -123,7 +122,7 @@ def sample_offsets(
 ) -> FloatArray:
     """Offsets [m] of one drive of a single segment, shape (n,); see `OffsetSampler.sample`.
 
-    On the driver's own clock where the segment's speed, if known, is below 40 km/h (`own_clock`).
+    On the driver's own clock where the segment's speed, if known, is below 40 km/h (`base.segment`).
     """
     sampler, inside = OffsetSampler(profile, seed), segment.inside
     time, speed = segment.time[inside], np.nan_to_num(segment.speed[inside], nan=MINIMUM_SPEED)

@@ -7,8 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, ScenarioInput, scenario_input, several
-from xosc_lateral.workflows.opened import HeldPath, is_document, opened, opened_as_one
+from xosc_lateral.files.mapping import MappingLike, as_mapping
+from xosc_lateral.workflows.opened import (
+    DocumentLike,
+    HeldPath,
+    RoadLike,
+    ScenarioInput,
+    is_document,
+    opened,
+    opened_as_one,
+    scenario_input,
+    several,
+)
 from xosc_lateral.workflows.options import PathLike, Paths, ProfileLike, declare_options, flag, roads
 from xosc_lateral.workflows.options import paths as as_paths
 from xosc_lateral.workflows.result import given_profile
@@ -19,7 +29,6 @@ if TYPE_CHECKING:
     from xosc_lateral.extras.detect.observation import Sensor
     from xosc_lateral.extras.detect.scoring import Tally
     from xosc_lateral.extras.detect.sight import Sight
-    from xosc_lateral.files.mapping import MappingLike
 
 
 def _known_sensor(text: str) -> str:
@@ -106,15 +115,13 @@ def detect(
     """
     from dataclasses import replace as replaced
 
-    from xosc_lateral.extras.detect.band import keeping_spectrum, spectrum_in
     from xosc_lateral.extras.detect.cut_ins import cut_ins_like
     from xosc_lateral.extras.detect.detection import Detection, count_all
-    from xosc_lateral.extras.detect.logistic import TRAINED_RULE, read_detectors, train_all
-    from xosc_lateral.extras.detect.observation import read_sensor
+    from xosc_lateral.extras.detect.observation import keeping_spectrum, read_sensor, spectrum_in
+    from xosc_lateral.extras.detect.other_detectors import TRAINED_RULE, read_detectors, train_all
     from xosc_lateral.extras.detect.sight import sight_of
     from xosc_lateral.extras.detect.sources import SourceSettings, checked, sources_of
     from xosc_lateral.extras.detect.tuning import read_goal, tune_all
-    from xosc_lateral.files.mapping import as_mapping
     from xosc_lateral.workflows.batch.call import read_shard
     from xosc_lateral.workflows.conversion.settings import ConvertSettings
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +22,12 @@ from xosc_lateral.extras.detect.sources import SourceSettings, converted
 from xosc_lateral.extras.detect.tracks import STEP, LaneChange
 from xosc_lateral.extras.detect.vary import Variations, vary
 from xosc_lateral.files.atomic import write_atomically
+from xosc_lateral.files.pages.chart import ENRICHED
+from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.batch.request import Request, concrete, document_kind
 from xosc_lateral.workflows.result import PathLike, Result, write_page
-
-if TYPE_CHECKING:
-    from xosc_lateral.files.pages.figure import Figure
 
 FACTS = {"duration": "s", "gap": "m", "entry": "m/s", "end": "m"}
 """Of a cut-in, with units: from begin to end of its movement; free space to who is cut in on when its side is on the
@@ -194,9 +194,6 @@ class CutIns(Result):
 
     def plot(self) -> Figure:
         """How each figure is spread over the sets."""
-        from xosc_lateral.files.pages.chart import ENRICHED
-        from xosc_lateral.files.pages.figure import Figure
-
         frame = self.cases()
         figure = Figure(1, len(FACTS), height=120.0)
         for panel, (name, unit) in zip(figure.row(0), FACTS.items(), strict=True):
@@ -210,8 +207,6 @@ class CutIns(Result):
         return write_page(path, "cut-ins.html", self._page, inputs=[self.scenario], force=force)
 
     def _page(self) -> str:
-        from xosc_lateral.files.pages.page import Page
-
         page = Page("Cut-ins as drivers take them")
         page.lead(self._finding())
         page.section("Spread")

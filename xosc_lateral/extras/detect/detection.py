@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +15,14 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.base.texts import aligned, counted, hours_in_words
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import Sensor
+from xosc_lateral.extras.detect.page import curves_figure, detection_page
 from xosc_lateral.extras.detect.scoring import LEAST_HOURS, Case, Curve, Tally, alarms_in_words, plain, worst_of
 from xosc_lateral.extras.detect.sources import Source, SourceSettings, checked
 from xosc_lateral.extras.detect.tracks import moves_in_lane
 from xosc_lateral.extras.detect.tuning import Carried, Goal, not_met
+from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.source import parsed_hashes
 from xosc_lateral.workflows.result import PathLike, Result, write_page
-
-if TYPE_CHECKING:
-    from xosc_lateral.files.pages.figure import Figure
 
 HEADINGS = ("source", "detector", "false alarms / h", "seen", "before the marking", "time before it [s]")
 FIGURES = {
@@ -186,14 +185,10 @@ class Detection(Result):
 
     def plot(self) -> Figure:
         """Cut-ins seen in time, and the median time before the marking, over false alarms an hour."""
-        from xosc_lateral.extras.detect.page import curves_figure
-
         return curves_figure(self.curves)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page: table, curves, and the worst cases in the player."""
-        from xosc_lateral.extras.detect.page import detection_page
-
         html = partial(
             detection_page,
             lead=[f"{self.headline()}.", *self.legend()],

@@ -59,7 +59,7 @@ class Detector(ABC):
 
     def label(self) -> str:
         """Name with its settings."""
-        return self.name
+        return self.title()
 
     def title(self) -> str:
         """Name with its settings but the threshold."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, rate
 from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.track import Column, lane_levels
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET, Course

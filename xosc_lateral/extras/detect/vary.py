@@ -8,26 +8,32 @@ from dataclasses import dataclass
 from itertools import chain
 from itertools import count as numbers
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from lxml import etree
 
+from xosc_lateral.base.arrays import NORMAL_90
+from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.numbers import NORMAL_90
 from xosc_lateral.base.texts import counted
 from xosc_lateral.base.version import __version__
+from xosc_lateral.drivers.model.profile import Maneuvers
+from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
+from xosc_lateral.files.atomic import together, write_atomically
+from xosc_lateral.files.openscenario.read import RoadSearch
+from xosc_lateral.files.openscenario.references import parameter_name
+from xosc_lateral.files.openscenario.write import build
+from xosc_lateral.files.openscenario.write.draft import Draft, source_of
+from xosc_lateral.files.openscenario.write.fit import rewrite_paths
+from xosc_lateral.files.output_paths import claim, output_folder, template_mark
+from xosc_lateral.workflows.conversion.load import Played, play_scenario
 from xosc_lateral.workflows.options import ProfileLike, declare_options, flag
-from xosc_lateral.workflows.result import PathLike, Paths, Result, given_profile
+from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, given_profile
+from xosc_lateral.world.motion.nominal import PlayedAction
 from xosc_lateral.world.motion.segments import leads_left
 from xosc_lateral.world.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.world.scenario.private_actions import LONGITUDINAL, LaneChangeAction
-
-if TYPE_CHECKING:
-    from xosc_lateral.drivers.model.maneuvers import Maneuvers
-    from xosc_lateral.files.openscenario.write.draft import Draft
-    from xosc_lateral.workflows.conversion.load import Played
-    from xosc_lateral.world.motion.nominal import PlayedAction
 
 
 @declare_options
@@ -71,16 +77,6 @@ def vary(
     DriverProfileError
         The profile holds no maneuvers.
     """
-    from xosc_lateral.base.errors import DriverProfileError, FormatError
-    from xosc_lateral.files.atomic import together, write_atomically
-    from xosc_lateral.files.openscenario.read import RoadSearch
-    from xosc_lateral.files.openscenario.write import build
-    from xosc_lateral.files.openscenario.write.draft import Draft
-    from xosc_lateral.files.openscenario.write.fit import rewrite_paths
-    from xosc_lateral.files.output_paths import claim, output_folder, template_mark
-    from xosc_lateral.workflows.conversion.load import play_scenario
-    from xosc_lateral.workflows.result import as_paths
-
     profile = given_profile(like, library)
     if profile.maneuvers is None:
         what = f"profile {profile.name} holds no maneuvers: fit TABLE... --maneuvers RECORDING makes one that does"
@@ -146,9 +142,6 @@ def _drawn(
     replaces: bool,
 ) -> _Drawn:  # fmt: skip
     """Draw; the draft's lane changes refer to these parameters."""
-    from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
-    from xosc_lateral.files.openscenario.references import parameter_name
-
     changes, lanes = _lane_changes(draft, played), RoadLanes(played.network)
     declarations = draft.root.find("{*}ParameterDeclarations")
     if declarations is None:
@@ -210,8 +203,6 @@ def _add_speed_change(
     dynamics: etree._Element, change: PlayedAction, speed: float, parameter: str, duration: str
 ) -> None:
     """Beside a lane change, in its event: from a speed [m/s] to one that is by so much higher when it ends."""
-    from xosc_lateral.files.openscenario.write import build
-
     action = next(dynamics.iterancestors("{*}Action"))
     beside = etree.Element("Action", name=f"{change.path[-1]} {parameter}")
     speed_action = build.sub(beside, "PrivateAction/LongitudinalAction/SpeedAction")
@@ -225,8 +216,6 @@ def _add_speed_change(
 
 def _lane_changes(draft: Draft, played: Played) -> list[tuple[PlayedAction, etree._Element]]:
     """The scenario's own that end and state a time or a rate, in order of their begin, with the elements that do."""
-    from xosc_lateral.files.openscenario.write.draft import source_of
-
     changes = []
     for action in sorted(played.motion.actions, key=lambda action: (action.start, action.path)):
         is_shared = action.action.place.path != str(played.scenario.path)  # it is a catalog's
@@ -262,8 +251,6 @@ class Follower(NamedTuple):
 
 def _closest(runs: list[Played]) -> dict[str, Follower]:
     """By vehicle that changes lanes."""
-    from xosc_lateral.extras.recordings.lane_order import RoadLanes, vehicle_next
-
     followers = dict[str, Follower]()
     for played in runs:
         lanes, vehicles = RoadLanes(played.network), played.motion.entities
@@ -284,19 +271,17 @@ def _distribution(
     version: tuple[int, int], scenario: str, drawn: dict[str, list[float]], description: str
 ) -> etree._Element:
     """The document that gives the parameters their values, a set for each variation."""
-    from xosc_lateral.files.openscenario.write.build import HEADER_DATE, decimal, sub
-
     root = etree.Element("OpenSCENARIO")
     minor = max(version[1], 1)  # 1.0 has no parameter distributions
-    sub(root, "FileHeader", revMajor="1", revMinor=str(minor), date=HEADER_DATE, description=description,
+    build.sub(root, "FileHeader", revMajor="1", revMinor=str(minor), date=build.HEADER_DATE, description=description,
         author=f"xosc-lateral {__version__}")  # fmt: skip
-    owner = sub(root, "ParameterValueDistribution")
-    sub(owner, "ScenarioFile", filepath=scenario)
-    holder = sub(owner, "Deterministic/DeterministicMultiParameterDistribution/ValueSetDistribution")
+    owner = build.sub(root, "ParameterValueDistribution")
+    build.sub(owner, "ScenarioFile", filepath=scenario)
+    holder = build.sub(owner, "Deterministic/DeterministicMultiParameterDistribution/ValueSetDistribution")
     for values in zip(*drawn.values(), strict=True):
-        variation = sub(holder, "ParameterValueSet")
+        variation = build.sub(holder, "ParameterValueSet")
         for name, value in zip(drawn, values, strict=True):
-            sub(variation, "ParameterAssignment", parameterRef=name, value=decimal(value, 3))
+            build.sub(variation, "ParameterAssignment", parameterRef=name, value=build.decimal(value, 3))
     etree.indent(root, "  ")
     return root
 

@@ -19,6 +19,7 @@ from xosc_lateral.extras.dossier.claims import (
     Finding,
     State,
     contents_of,
+    dossier_page,
     judged,
     known_anomalies,
     summary_of,
@@ -207,8 +208,6 @@ class Dossier(Result):
 
     def page(self) -> str:
         """HTML."""
-        from xosc_lateral.extras.dossier.page import dossier_page
-
         return dossier_page(f"{self.kind} {self.subject}", self._contents, self.findings, self.parts, self.versions)
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:

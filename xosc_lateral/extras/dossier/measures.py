@@ -6,22 +6,25 @@ from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.extras.detect.call import detect
+from xosc_lateral.extras.detect.detection import Detection
 from xosc_lateral.extras.dossier.claims import Measure
+from xosc_lateral.files.profiles import write_profile
 from xosc_lateral.workflows.batch.manifest import ManifestRow
 from xosc_lateral.workflows.batch.page import has_new_contact
+from xosc_lateral.workflows.batch.verify import verify
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.convert import convert
+from xosc_lateral.workflows.playing.call import play
 from xosc_lateral.workflows.playing.templates import write_template
-
-if TYPE_CHECKING:
-    from xosc_lateral.extras.detect.detection import Detection
-    from xosc_lateral.workflows.profiles.evaluate import Evaluation
-    from xosc_lateral.workflows.result import DrivesLike
+from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
+from xosc_lateral.workflows.profiles.fit import evaluate
+from xosc_lateral.workflows.result import DrivesLike
 
 TEMPLATES = ("cut-in", "overtake-truck", "dense-traffic")
 """Shipped scenarios that claims are tried on: a vehicle under test that is cut in on, curves and trucks, ten cars."""
@@ -53,16 +56,11 @@ class ProfileBench:
     @cached_property
     def evaluation(self) -> Evaluation | None:
         """On the drives that are given."""
-        from xosc_lateral.workflows.profiles.evaluate import evaluate
-
         return None if self._data is None else evaluate(self.profile, self._data, classify=False)
 
     @cached_property
     def detection(self) -> Detection:
         """What the built-in detectors do on the templates, as written and lifelike."""
-        from xosc_lateral.extras.detect.call import detect
-        from xosc_lateral.files.profiles import write_profile
-
         with TemporaryDirectory() as folder:
             for name in TEMPLATES:
                 write_template(name, Path(folder) / "templates")
@@ -75,9 +73,6 @@ class ProfileBench:
 
 
 def _not_reproduced(bench: ProfileBench) -> float:
-    from xosc_lateral.files.profiles import write_profile
-    from xosc_lateral.workflows.batch.verify import verify
-
     with TemporaryDirectory() as folder:
         scenario, _ = write_template(TEMPLATES[0], folder)
         profile = Path(folder) / "profile.json"
@@ -90,8 +85,6 @@ def _not_reproduced(bench: ProfileBench) -> float:
 
 def _playback_error(bench: ProfileBench) -> float:
     """Largest distance between where a vehicle was sampled to be and where the output plays it. [m]"""
-    from xosc_lateral.workflows.playing.call import play
-
     errors = []
     for made, _ in bench.conversions:
         played = play(made.data, road=made.road).to_frame()
@@ -141,15 +134,9 @@ class FolderBench(NamedTuple):
     rows: tuple[ManifestRow, ...]
 
 
-def _outputs_that_differ(bench: FolderBench) -> float:
-    from xosc_lateral.workflows.batch.verify import verify
-
-    return float(len(verify(bench.folder, workers=0).failing))
-
-
 FOLDER_MEASURES: Mapping[str, Measure] = {
     "failed_outputs": lambda bench: float(sum(bool(row.error) for row in bench.rows)),
-    "outputs_that_differ": _outputs_that_differ,
+    "outputs_that_differ": lambda bench: float(len(verify(bench.folder, workers=0).failing)),
     "outputs_with_new_contacts": lambda bench: float(sum(map(has_new_contact, bench.rows))),
 }
 

@@ -21,8 +21,8 @@ CALLS = {
     "Moment": "xosc_lateral.extras.live.traffic",
     "EsminiTraffic": "xosc_lateral.extras.live.esmini",
     "SumoTraffic": "xosc_lateral.extras.live.sumo",
-    "export_c": "xosc_lateral.extras.live.c_driver",
-    "export_fmu": "xosc_lateral.extras.live.fmu",
+    "export_c": "xosc_lateral.extras.live.export",
+    "export_fmu": "xosc_lateral.extras.live.export",
     "LiveRun": "xosc_lateral.extras.live.call",
 }
 SERVICES = {"told_by_player": "xosc_lateral.extras.live.user_player"}

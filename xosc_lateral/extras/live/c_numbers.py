@@ -13,8 +13,7 @@ import numpy as np
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import DISTANCES, LIVE_PAUSE, LIVE_RANGES, OFFSET_LANES, TIME, context_range
 from xosc_lateral.base.names import in_c
-from xosc_lateral.base.own_clock import CLOCK_RATES, CLOCK_SPEEDS, SPEED_SLACK
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.segment import CLOCK_RATES, CLOCK_SPEEDS, MINIMUM_SPEED, SPEED_SLACK
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.model import actuator
 from xosc_lateral.drivers.model import effects as kinds
@@ -34,7 +33,7 @@ from xosc_lateral.drivers.model.linear_filters import SAMPLES_AHEAD
 from xosc_lateral.drivers.model.plausibility import MINIMUM_LANE_WIDTH
 from xosc_lateral.drivers.model.profile import DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed
-from xosc_lateral.extras.live import paths
+from xosc_lateral.extras.live import moment
 from xosc_lateral.world.motion import driver_clock
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME
 
@@ -105,10 +104,10 @@ def numbers_of(profile: DriverProfile) -> tuple[dict[str, int], list[str]]:
         "OFFSET_LANES": OFFSET_LANES.value, "MINIMUM_LANE_WIDTH": MINIMUM_LANE_WIDTH,
         **{name: getattr(actuator, name) for name in ("RESPONSE_SPEED", "RESPONSE_ACCELERATION", "LARGEST_SPEED",
                                                       "LARGEST_ACCELERATION", "IMPOSSIBLE_ACCELERATION")},
-        "STEP_PEAK": driver_clock.STEP_PEAK, "NEGLIGIBLE_REST": paths.NEGLIGIBLE_REST,
-        "LARGEST_SINE": paths.LARGEST_SINE,
-        "STANDSTILL": paths.STANDSTILL,
-        "CLOCK_KNOTS": len(CLOCK_SPEEDS), "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": paths.CLOCK_TOLERANCE,
+        "STEP_PEAK": driver_clock.STEP_PEAK, "NEGLIGIBLE_REST": moment.NEGLIGIBLE_REST,
+        "LARGEST_SINE": moment.LARGEST_SINE,
+        "STANDSTILL": moment.STANDSTILL,
+        "CLOCK_KNOTS": len(CLOCK_SPEEDS), "SPEED_SLACK": SPEED_SLACK, "CLOCK_TOLERANCE": moment.CLOCK_TOLERANCE,
         **seeds,
     }  # fmt: skip
     sizes |= core_sizes | {"HIDDEN": max(1, len(hidden))}

@@ -6,20 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, notes, warnings
 from xosc_lateral.base.plugins import service
-from xosc_lateral.extras.live.loop import later_actions, not_driven, run_to_end
+from xosc_lateral.extras.live.loop import SimulatorScene, later_actions, motion_of, not_driven, run_to_end, sumo_network
+from xosc_lateral.files.osi import SUFFIXES
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.output_tables import RECOGNISED_BY
 from xosc_lateral.workflows.options import SHARED, declare_options, flag, profile_and_entities, texts
 from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, given_profile
-
-if TYPE_CHECKING:
-    from xosc_lateral.extras.live.scene import SimulatorScene
+from xosc_lateral.world.scenario.controllers import is_named_under_test
 
 STATE_COLUMNS = (*RECOGNISED_BY, "offset", "driver", "steered")
 """Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
@@ -63,7 +62,6 @@ def live_esmini(
     """
     from xosc_lateral.extras.live.esmini import EsminiTraffic
     from xosc_lateral.extras.live.esmini_library import open_player
-    from xosc_lateral.extras.live.scene import SimulatorScene
     from xosc_lateral.workflows.conversion.result import Neighbours
 
     chosen = given_profile(profile, folders)
@@ -116,7 +114,6 @@ def live_sumo(
     SUMO's own random seed is as `config` (``.sumocfg``) says; `options` are further words of its command line. Raises
     `SimulationError` in one line.
     """
-    from xosc_lateral.extras.live.scene import SimulatorScene, sumo_network
     from xosc_lateral.extras.live.sumo import SumoTraffic, start
     from xosc_lateral.workflows.conversion.result import Neighbours
 
@@ -207,10 +204,6 @@ class LiveRun(Result):
 
         Raises `SimulationError` if SUMO's network can't be made a road.
         """
-        from xosc_lateral.extras.live.scene import motion_of
-        from xosc_lateral.files.osi import SUFFIXES
-        from xosc_lateral.world.scenario.controllers import is_named_under_test
-
         output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
         claim([output], force=force)
         network = self._scene.network()

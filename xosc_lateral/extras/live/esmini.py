@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import FormatError, SimulationError
-from xosc_lateral.base.own_clock import clock_rate
+from xosc_lateral.base.segment import clock_rate
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.live.esmini_library import OBJECT_STATE, EsminiLibrary, ObjectState, StoryboardCallback
 from xosc_lateral.extras.live.esmini_places import Ledger, LivePlaces, Rest
-from xosc_lateral.extras.live.loop import Row
-from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
-from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, Moves, left_of_gap
+from xosc_lateral.extras.live.loop import Row, UnderTest
+from xosc_lateral.extras.live.moment import CLOCK_TOLERANCE, Moves, OpenDriveRoads, Places, left_of_gap
 from xosc_lateral.extras.live.traffic import Moment, Traffic
-from xosc_lateral.extras.live.under_test import UnderTest
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import read_scenario
 from xosc_lateral.workflows.conversion.result import Neighbours

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.extras.live.paths import STANDSTILL
+from xosc_lateral.extras.live.moment import STANDSTILL
 from xosc_lateral.world.road.network import RoadNetwork
 
 LANE_STEP = 0.5

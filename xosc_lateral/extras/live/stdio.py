@@ -14,8 +14,7 @@ from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.limits import LIVE_LINE, LIVE_RANGES
 from xosc_lateral.base.segment import CONTEXT_UNITS
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.moment import OpenDriveRoads, Places
-from xosc_lateral.extras.live.paths import Moves
+from xosc_lateral.extras.live.moment import Moves, OpenDriveRoads, Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
 from xosc_lateral.files.json_text import refuse_depth
 from xosc_lateral.files.opendrive.reader import read_opendrive

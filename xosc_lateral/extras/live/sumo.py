@@ -22,12 +22,9 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import SimulationError
 from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.extras.live.loop import Row
-from xosc_lateral.extras.live.moment import Places
-from xosc_lateral.extras.live.paths import Moves
-from xosc_lateral.extras.live.scene import CATEGORY_OF_CLASS, sumo_entity
+from xosc_lateral.extras.live.loop import CATEGORY_OF_CLASS, Row, UnderTest, sumo_entity
+from xosc_lateral.extras.live.moment import Moves, Places
 from xosc_lateral.extras.live.traffic import Moment, Traffic
-from xosc_lateral.extras.live.under_test import UnderTest
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.scenario.entity import Entity
 from xosc_lateral.world.surroundings.around import SIGHT_DISTANCE, LaneStretch

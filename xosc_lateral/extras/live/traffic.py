@@ -25,8 +25,18 @@ from xosc_lateral.drivers.model.plausibility import first_implausible, implausib
 from xosc_lateral.drivers.model.profile import Basis, DriverProfile, sampling_hash
 from xosc_lateral.drivers.model.seeds import of_driver
 from xosc_lateral.drivers.model.stream import sealed, unsealed
-from xosc_lateral.extras.live.moment import Places, Roads, give_way_now, look_around
-from xosc_lateral.extras.live.paths import CLOCK_TOLERANCE, DRIVER, SPEEDS_REMEMBERED, Moves, drive_on, pace_of
+from xosc_lateral.extras.live.moment import (
+    CLOCK_TOLERANCE,
+    DRIVER,
+    SPEEDS_REMEMBERED,
+    Moves,
+    Places,
+    Roads,
+    drive_on,
+    give_way_now,
+    look_around,
+    pace_of,
+)
 from xosc_lateral.workflows.conversion.driver_context import mirrored_context, sides_known
 from xosc_lateral.workflows.conversion.result import Neighbours
 from xosc_lateral.world.surroundings.give_way import Response

@@ -21,8 +21,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, IntArray, true_slices
 
 MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
 ENOUGH_ROWS = 0.5  # The memory is the longest for which this share of the rows has so much past in its own run. [-]

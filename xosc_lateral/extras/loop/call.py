@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from threadpoolctl import threadpool_limits
+
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note
+from xosc_lateral.files.atomic import together, write_atomically
+from xosc_lateral.files.json_text import canonical_json
+from xosc_lateral.files.mapping import MappingLike, as_mapping
 from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.workflows.options import declare_options, flag, texts
 from xosc_lateral.workflows.result import (
@@ -26,7 +32,6 @@ if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.extras.loop.close import LoopResult
     from xosc_lateral.extras.loop.shown import Shown
-    from xosc_lateral.files.mapping import MappingLike
     from xosc_lateral.files.pages.figure import Figure
 
 
@@ -68,10 +73,7 @@ def close_loop(
     FormatError
         A role that there is not, or of a column that the drives lack.
     """
-    from dataclasses import replace
-
     from msgspec.structs import replace as with_fields
-    from threadpoolctl import threadpool_limits
 
     from xosc_lateral.drivers.model.profile import Provenance
     from xosc_lateral.extras.loop import close
@@ -121,8 +123,6 @@ def plan_loop(
     FormatError
         A role that there is not, or of a column that the drives lack.
     """
-    from threadpoolctl import threadpool_limits
-
     from xosc_lateral.extras.loop import close
 
     inputs = given_drives(drives, columns)
@@ -134,8 +134,6 @@ def plan_loop(
 
 def _roles_of(inputs: GivenDrives, columns: MappingLike | None, roles: Mapping[str, str] | None) -> dict[str, str]:
     """Roles by column: those told, else a mapping file's, which serves many tables: of columns there are."""
-    from xosc_lateral.files.mapping import as_mapping
-
     there = {"lane_width"}.union(*(drive.context for drive in inputs.drives))
     of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
     return {**of_file, **(roles or {})}
@@ -166,7 +164,7 @@ class LoopPlan(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.extras.loop.loop_json import finite, shown_records
+        from xosc_lateral.extras.loop.loop_report import finite, shown_records
 
         return {"shown": finite(shown_records(self._shown))}
 
@@ -250,7 +248,7 @@ class ClosedLoop(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """`report.json`: plain values, as ``--json`` prints them."""
-        from xosc_lateral.extras.loop.loop_json import finite, loop_record
+        from xosc_lateral.extras.loop.loop_report import finite, loop_record
 
         record: dict[str, Any] = finite(loop_record(self._result, self._given.files))
         record["provenance"]["inputs"] = dict(self._given.inputs)
@@ -265,9 +263,7 @@ class ClosedLoop(Result):
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
-        from xosc_lateral.extras.loop.loop_page import loop_page
-        from xosc_lateral.files.atomic import together, write_atomically
-        from xosc_lateral.files.json_text import canonical_json
+        from xosc_lateral.extras.loop.loop_report import loop_page
 
         output = output_folder(folder)
         claim(self.report_files(output), self._given.files, force=force)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import NORMAL_95
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.model.core.base import ModelKind
 from xosc_lateral.drivers.model.effects import Effect
@@ -87,7 +87,7 @@ HARMFUL = "significant, but with it held-out blocks are predicted worse by its o
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopResult:
-    """What the loop found, as data; `xosc_lateral.extras.loop.loop_page` turns it into words."""
+    """What the loop found, as data; `xosc_lateral.extras.loop.loop_report` turns it into words."""
 
     base: DriverProfile
     refined: DriverProfile

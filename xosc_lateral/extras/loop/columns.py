@@ -33,10 +33,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, rate
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.rates import rate
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.drives.roles import Role as Role
 from xosc_lateral.extras.loop.autocorrelation import positions_in_run
 from xosc_lateral.extras.loop.timeline import PAD, Timeline

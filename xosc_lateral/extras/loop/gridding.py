@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.drivers.drives.drive import CutRules, Drive, Run, cut_runs, grid_of
-from xosc_lateral.drivers.drives.resampling import STEP, average, in_digits, nearest
+from xosc_lateral.drivers.drives.drive import STEP, CutRules, Drive, Run, average, cut_runs, grid_of, in_digits, nearest
 
 MAXIMUM_LEVELS = 8
 """A column with no more different values than this holds levels. [-]"""

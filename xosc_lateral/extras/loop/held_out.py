@@ -9,12 +9,10 @@ from functools import cached_property, partial
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, true_slices
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.rows import true_slices
-from xosc_lateral.drivers.drives.drive import MIN_RUN, Run
+from xosc_lateral.drivers.drives.drive import MIN_RUN, STEP, Run
 from xosc_lateral.drivers.drives.filters import filtered
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.evaluation.metrics import (
     METRICS,
     Distances,

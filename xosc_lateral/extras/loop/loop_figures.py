@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import FloatArray, true_slices
 from xosc_lateral.drivers.model.effects import Acts, ColumnEffect, Cycle, Product, Regimes, Step, TimeSmooth
 from xosc_lateral.extras.loop import loop_curves
 from xosc_lateral.extras.loop.close import Finding, LoopResult
-from xosc_lateral.extras.loop.gapped_spectrum import gapped_spectrum
 from xosc_lateral.extras.loop.identify import hold_out_blocks
+from xosc_lateral.extras.loop.loop_curves import gapped_spectrum
 from xosc_lateral.extras.loop.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.extras.loop.passage import Passage
 from xosc_lateral.extras.loop.residual import LOCAL_QUANTILES

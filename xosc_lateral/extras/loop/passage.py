@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import BoolArray, FloatArray, true_slices
 from xosc_lateral.drivers.model.effects import ColumnEffect
 from xosc_lateral.extras.loop.columns import MIN_SHARE
 from xosc_lateral.extras.loop.timeline import COARSE, Coarse

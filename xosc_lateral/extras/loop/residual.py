@@ -23,7 +23,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.segment import Segment
-from xosc_lateral.drivers.drives.resampling import in_digits
+from xosc_lateral.drivers.drives.drive import in_digits
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.drivers.model.seeds import child

@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import structs
 from scipy.special import stdtr
 
-from xosc_lateral.base.numbers import NORMAL_95
+from xosc_lateral.base.arrays import NORMAL_95
 from xosc_lateral.base.plugins import defined_in
 from xosc_lateral.drivers.fitting.regression import clustered_least_squares, small_sample_factor
 from xosc_lateral.drivers.model.effects import ColumnEffect, Form, Product

@@ -72,7 +72,7 @@ def close_loop(
     from xosc_lateral.extras.loop.call import ClosedLoop
     from xosc_lateral.files.atomic import together
     from xosc_lateral.files.output_paths import claim, output_file, output_folder
-    from xosc_lateral.workflows.profiles.profiles import PROFILE_SUFFIXES
+    from xosc_lateral.workflows.result import PROFILE_SUFFIXES
 
     if plan:
         asked = {name: options[name] for name in ("seed", "leave_out", "roles", "columns") if name in options}

@@ -15,7 +15,7 @@ VERBS = {
     ),
 }
 CALLS = {
-    "read_maneuvers": "xosc_lateral.extras.recordings.maneuvers",
+    "read_maneuvers": "xosc_lateral.extras.recordings.reconstruct",
     "reconstruct": "xosc_lateral.extras.recordings.reconstruct",
     "import_drives": "xosc_lateral.extras.recordings.importers",
     "Reconstruction": "xosc_lateral.extras.recordings.reconstruction",
@@ -23,6 +23,6 @@ CALLS = {
 }
 SERVICES = {
     "drives_of": "xosc_lateral.extras.recordings.recordings",
-    "is_left_handed": "xosc_lateral.extras.recordings.sumo",
+    "is_left_handed": "xosc_lateral.extras.recordings.importers.fcd",
     "write_osi": "xosc_lateral.extras.recordings.osi_write",
 }

@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, blocks
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rows import blocks
 from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course

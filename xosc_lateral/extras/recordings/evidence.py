@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.arrays import BLOCK, FloatArray, IntArray
+from xosc_lateral.base.lazy import spatial
 from xosc_lateral.drivers.drives.evidence import UNIT_SIZES, noisy
 
 USUAL_WIDTH = 1.8  # [m]
@@ -50,14 +50,12 @@ def overlaps(
     vehicle: IntArray, step: float,
 ) -> Mapping[tuple[int, int], float]:  # fmt: skip
     """Pairs of vehicles of which one's middle lies in the other, and how long: sizes may be wrong by half. [s]"""
-    from scipy.spatial import cKDTree
-
     good = np.flatnonzero(np.isfinite(time + x + y + heading))
     good = good[np.argsort(time[good], kind="stable")]
     instant, near = np.round((time[good] - time.min()) / step), [np.zeros((0, 2), dtype=np.intp)]
     for part in np.split(np.arange(len(good)), np.searchsorted(instant, instant[BLOCK::BLOCK])):  # instants are whole
         places = np.column_stack([x[good[part]], y[good[part]], 1e3 * instant[part]])
-        near.append(good[part[cKDTree(places - places[:1]).query_pairs(8.0, output_type="ndarray")]])
+        near.append(good[part[spatial.cKDTree(places - places[:1]).query_pairs(8.0, output_type="ndarray")]])
     first, second = np.concatenate(near).T
     other = vehicle[first] != vehicle[second]
     first, second = first[other], second[other]

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+import xosc_lateral as xl
 from xosc_lateral.base.plugins import plugin_names
 from xosc_lateral.cli import TYPER_STYLE, VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Writing, command, pairs, with_options, write_stdout
@@ -26,11 +27,9 @@ class _Table(Writing):
 
     def fill(self, name: str, sources: Path | Sequence[Path], **options: Any) -> None:
         """Read recordings of a format, write them as a table, and say what they are."""
-        from xosc_lateral import import_drives
-
         files = [sources] if isinstance(sources, Path) else sources
         (table,) = self.claim(files, table=(self.output, "drives.parquet"))
-        imported = import_drives(name, sources, **options)
+        imported = xl.import_drives(name, sources, **options)
         if table is None:
             write_stdout(imported.csv())
             self.say_words(str(imported), None)

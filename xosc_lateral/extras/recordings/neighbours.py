@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
-from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.arrays import BLOCK, BoolArray, FloatArray, IntArray
 from xosc_lateral.base.track import MAX_GAP
 from xosc_lateral.extras.recordings.lane_order import NEIGHBOUR_DISTANCE, LaneGraph, Order, in_groups
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rates import rate
+from xosc_lateral.base.arrays import FloatArray, rate
 from xosc_lateral.base.track import Track
 from xosc_lateral.extras.recordings.plan import FRAME, VehiclePlan
 from xosc_lateral.extras.recordings.recorded import own_lateral

@@ -9,20 +9,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.lazy import interpolate
 from xosc_lateral.base.track import Track
-from xosc_lateral.extras.recordings.lateral import LateralPlan, Transition, lateral_plan
-from xosc_lateral.extras.recordings.recorded import Recording, own_lateral
+from xosc_lateral.extras.recordings.recorded import LateralPlan, Recording, Transition, lateral_plan, own_lateral
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork
-
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
 
 FRAME = 0.1  # vehicles appear and leave at multiples of this: between two frames they would be placed off by a way [s]
 ENTRY_DELAY = 0.2  # after a recorded vehicle comes onto a road, its planned one has, too: `--error` is between [s]
@@ -225,10 +221,8 @@ def _without_reversing(t: FloatArray, w: FloatArray, corners: FloatArray, error:
         corners = np.insert(corners, k, 0.5 * (corners[k - 1] + corners[k]))
 
 
-def _spline(t: FloatArray, w: FloatArray, knots: FloatArray) -> BSpline[np.float64]:
-    from scipy.interpolate import make_lsq_spline
-
-    return make_lsq_spline(t, w, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2)
+def _spline(t: FloatArray, w: FloatArray, knots: FloatArray) -> interpolate.BSpline[np.float64]:
+    return interpolate.make_lsq_spline(t, w, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2)
 
 
 def _with_enough_corners(t: FloatArray, w: FloatArray, error: float, apart: float) -> FloatArray:
@@ -265,14 +259,12 @@ def _moved(t: FloatArray, w: FloatArray, knots: FloatArray, apart: float) -> Flo
     """Corners where the squared error is least (Gauss-Newton with halved steps), in order and apart."""
     if not len(knots):
         return knots
-    from scipy.interpolate import BSpline
-
     spline = _spline(t, w, knots)
     residual = w - spline(t)
     for _ in range(ROUNDS):
         edges = np.r_[t[0], knots, t[-1]]
         bend = np.diff(np.diff(spline(edges, 1)) / np.diff(edges))
-        basis = BSpline.design_matrix(t, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2).toarray()
+        basis = interpolate.BSpline.design_matrix(t, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2).toarray()
         moved = -bend * np.maximum(t[:, None] - knots, 0.0)  # what a later corner changes of the way
         step = np.linalg.lstsq(np.hstack([basis, moved]), residual, rcond=1e-10)[0][basis.shape[1] :]
         for _ in range(6):

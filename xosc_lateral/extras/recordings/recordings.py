@@ -14,14 +14,26 @@ from xosc_lateral.base.errors import FormatError, absent
 from xosc_lateral.base.texts import composed
 from xosc_lateral.extras.recordings.cuts import require_lane_direction
 from xosc_lateral.extras.recordings.importers import ImportedDrives, dlr_ht, dlr_ut, import_drives, levelx
-from xosc_lateral.extras.recordings.importers.fcd import NET_ENDINGS, lanes_of_net, of_rear_axles, read_fcd
+from xosc_lateral.extras.recordings.importers.fcd import (
+    NET_ENDINGS,
+    lanes_of_net,
+    of_rear_axles,
+    read_fcd,
+    read_sumo_net,
+)
 from xosc_lateral.extras.recordings.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
 from xosc_lateral.extras.recordings.importers.tracks import LaneShape, place_on_road
 from xosc_lateral.extras.recordings.lane_order import LaneGraph
 from xosc_lateral.extras.recordings.recorded import RecordedTrack
-from xosc_lateral.extras.recordings.road_file import SHOULDER, WIDTH_PIECE_LENGTH, WrittenLane, WrittenRoad, curved_plan
-from xosc_lateral.extras.recordings.roads_from_lanes import DrivenLane, roads_of_lanes
-from xosc_lateral.extras.recordings.sumo import read_sumo_net
+from xosc_lateral.extras.recordings.road_file import (
+    SHOULDER,
+    WIDTH_PIECE_LENGTH,
+    DrivenLane,
+    WrittenLane,
+    WrittenRoad,
+    curved_plan,
+    roads_of_lanes,
+)
 from xosc_lateral.files.held import exists
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.files.opendrive.reader import parse_opendrive, read_opendrive

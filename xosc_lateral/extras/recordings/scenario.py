@@ -9,9 +9,8 @@ import numpy as np
 from lxml import etree
 
 from xosc_lateral.extras.recordings.encounters import RelativeTrigger, Triggers
-from xosc_lateral.extras.recordings.lateral import Transition, peak_acceleration
 from xosc_lateral.extras.recordings.plan import VehiclePlan
-from xosc_lateral.extras.recordings.recorded import Recording
+from xosc_lateral.extras.recordings.recorded import Recording, Transition, peak_acceleration
 from xosc_lateral.extras.recordings.recordings import RecordedTraffic
 from xosc_lateral.extras.recordings.settings import ReconstructSettings
 from xosc_lateral.files.openscenario.write import build

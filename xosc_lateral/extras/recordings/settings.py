@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypedDict
 
 from xosc_lateral.workflows import options as say
-from xosc_lateral.workflows.inputs import RoadLike
+from xosc_lateral.workflows.opened import RoadLike
 from xosc_lateral.workflows.options import Paths, option
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")  # of the standard, that can be written

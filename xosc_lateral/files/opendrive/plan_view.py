@@ -12,11 +12,10 @@ from collections.abc import Iterable, Sequence
 from math import cos, sin
 
 import numpy as np
-from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.opendrive.document import RoadFile, XmlElement
-from xosc_lateral.world.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
+from xosc_lateral.world.road.geometry import MAX_TURN, Arc, Line, ParamCubic, Placed, ReferenceElement, Spiral
 from xosc_lateral.world.road.piecewise import Cubic
 
 PIECES_PER_ELEMENT = 32
@@ -100,13 +99,9 @@ def end_parameter(v: tuple[float, float, float, float], length: float) -> float:
 MINIMUM_ELEMENT_LENGTH = 1e-9
 
 
-class CubicRecord(Struct, frozen=True):
+class CubicRecord(Placed, frozen=True):
     """A paramPoly3 or poly3, before its arc length is known."""
 
-    x: float
-    y: float
-    heading: float
-    length: float
     u: Cubic
     v: Cubic
     p_end: float

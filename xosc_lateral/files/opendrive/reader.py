@@ -13,9 +13,8 @@ from xosc_lateral.files.opendrive.plan_view import Record, finish_elements, read
 from xosc_lateral.files.xml import XmlDocument, document_of, read_document
 from xosc_lateral.world.road.geometry import ReferenceElement
 from xosc_lateral.world.road.network import RoadNetwork
-from xosc_lateral.world.road.piecewise import PiecewiseCubic
+from xosc_lateral.world.road.piecewise import HeaderOffset, PiecewiseCubic, Shape, Surface
 from xosc_lateral.world.road.road import Connection, Junction, Road, RoadLink
-from xosc_lateral.world.road.surface import HeaderOffset, Shape, Surface
 
 LENGTH_TOLERANCE = 0.01
 """road/@length and the end of its geometry may differ by this without a note. [m]"""

@@ -135,7 +135,9 @@ def mirrored(position: Position) -> Position:
         return position
     if isinstance(position, places.RelativeObjectPosition):
         along = position.dx, position.dy, position.dz
-        position = places.RelativeWorldPosition(position.entity_ref, *along, position.orientation, place=position.place)
+        position = places.RelativeWorldPosition(
+            position.entity_ref, *along, orientation=position.orientation, place=position.place
+        )
     if isinstance(position, places.LanePosition) and position.lane_id < 0:
         # To the right of the lane's own direction: the road's +t for lanes that go against it.
         position = replace(position, offset=-position.offset)

@@ -10,8 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import FloatArray, true_slices
 
 Ticks = list[tuple[float, str]]
 

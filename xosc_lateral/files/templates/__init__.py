@@ -16,9 +16,8 @@ from xml.sax.saxutils import quoteattr, unescape
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError, did_you_mean
 from xosc_lateral.base.plugins import plugins, shipped_folder
-from xosc_lateral.files.templates.parameter import Settings, Word
 from xosc_lateral.files.templates.plots import TEMPLATES
-from xosc_lateral.files.templates.template import Template
+from xosc_lateral.files.templates.template import Settings, Template, Word
 
 __all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template"]
 GROUP = "xosc_lateral.templates"  # entry points of further templates

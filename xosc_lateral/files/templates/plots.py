@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 
 from xosc_lateral.base.errors import XoscLateralError
-from xosc_lateral.files.templates.parameter import Number, Settings
-from xosc_lateral.files.templates.template import Bend, Motorway, Plot, Straight, Template, motorway
+from xosc_lateral.files.templates.template import Bend, Motorway, Number, Plot, Settings, Straight, Template, motorway
 
 CUT_IN = (
     Number("ego_speed", 30.0, 15.0, 45.0, "m/s", "Speed of the ego vehicle, in the slow lane."),

@@ -21,11 +21,18 @@ from xosc_lateral.files.atomic import files_of_run, temporary_files
 from xosc_lateral.files.output_paths import label_files
 from xosc_lateral.files.remote import address
 from xosc_lateral.files.source import file_hash, file_state
-from xosc_lateral.workflows.batch.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Job, convert_job
 from xosc_lateral.workflows.batch.journal import STATE_FOLDER, Journal, folder_lock
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, Timing, read_manifest
-from xosc_lateral.workflows.batch.workers import Pool, WorkerDiedError, open_pool, run_tasks
+from xosc_lateral.workflows.batch.workers import (
+    JobLimitError,
+    JobLimits,
+    Pool,
+    WorkerDiedError,
+    open_pool,
+    run_tasks,
+    within_limits,
+)
 
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""

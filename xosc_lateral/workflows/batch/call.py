@@ -21,15 +21,15 @@ from xosc_lateral.files.output_paths import claim, output_folder
 from xosc_lateral.files.remote import address, is_url, sent_back
 from xosc_lateral.workflows.batch.batch import JobOutcome, JobState, remove_empty, whole_folder
 from xosc_lateral.workflows.batch.batch import convert_many as outcomes_of
-from xosc_lateral.workflows.batch.guard import JobLimits
 from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
 from xosc_lateral.workflows.batch.journal import STATE_FOLDER
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.workflows.batch.page import write_batch_index
 from xosc_lateral.workflows.batch.progress import Display, Summary, follow
 from xosc_lateral.workflows.batch.request import read_request_table
+from xosc_lateral.workflows.batch.workers import JobLimits
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.inputs import scenarios_at
+from xosc_lateral.workflows.opened import scenarios_at
 from xosc_lateral.workflows.options import declare_options, flag, process_count, spelled_out
 from xosc_lateral.workflows.result import PathLike, Result
 

@@ -14,17 +14,17 @@ from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import msgspec
 
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.lazy import pa, parquet
 from xosc_lateral.base.limits import BATCH_JOBS, SMALL_PARSER_MEMORY
-from xosc_lateral.base.memory import address_space
+from xosc_lateral.base.process import address_space
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.source import check_regular
 from xosc_lateral.files.tables import foreign_errors
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 MANIFEST, TIMINGS = "manifest.parquet", "timings.parquet"
 
@@ -94,16 +94,12 @@ class ManifestRow:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        import msgspec
-
         values: dict[str, Any] = msgspec.to_builtins(self)
         return values
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
         """What `to_dict` gave; `ValueError` for another name, or a value that is missing or of the wrong kind."""
-        import msgspec
-
         if not isinstance(values, Mapping):
             raise ValueError(f"a row is a {type(values).__name__}")
         named = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
@@ -130,8 +126,6 @@ _MAPPINGS = ("parameters", "inputs", "profiles", "profile_sha256", "why_not", "m
 
 def manifest_schema() -> pa.Schema:
     """Columns of `manifest.parquet`."""
-    import pyarrow as pa
-
     types: dict[str, pa.DataType] = dict.fromkeys(("stale", "with_sensor", "cut_off"), pa.bool_())
     types |= dict.fromkeys(("variant", "seed", "entities", "trial_contacts", "behaviour", "schema"), pa.int64())
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
@@ -171,15 +165,11 @@ class Timing(NamedTuple):
 
 def is_of_now(path: Path) -> bool:
     """Whether a manifest has the columns that would be written now."""
-    import pyarrow.parquet as pq
-
-    return bool(pq.read_schema(path).equals(manifest_schema()))
+    return bool(parquet.read_schema(path).equals(manifest_schema()))
 
 
 def write_timings(timings: Iterable[tuple[str, Timing]], path: Path) -> None:
     """Write columns `output`, `seconds`, `state`."""
-    import pyarrow as pa
-
     schema = pa.schema([("output", pa.string()), ("seconds", pa.float64()), ("state", pa.string())])
     _write_table(path, schema, ({"output": output, **own._asdict()} for output, own in timings))
 
@@ -198,11 +188,8 @@ def _packed(row: ManifestRow) -> dict[str, Any]:
 
 
 def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     buffer = BytesIO()
-    with pq.ParquetWriter(buffer, schema, compression="zstd") as writer:
+    with parquet.ParquetWriter(buffer, schema, compression="zstd") as writer:
         while group := list(islice(rows, ROW_GROUP)):
             writer.write_table(pa.Table.from_pylist(group, schema=schema))
     data = buffer.getvalue()
@@ -213,10 +200,8 @@ def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) 
 def _read_table(path: Path) -> Iterator[dict[str, Any]]:
     if not path.exists():
         return
-    import pyarrow.parquet as pq
-
     check_regular(path)
-    with foreign_errors(path, "can't be read as Parquet"), pq.ParquetFile(path) as file:
+    with foreign_errors(path, "can't be read as Parquet"), parquet.ParquetFile(path) as file:
         if file.metadata.num_rows > BATCH_JOBS.value:
             raise FormatError(BATCH_JOBS.refusal(file.metadata.num_rows), path=path)
         batches = (batch.to_pylist() for batch in file.iter_batches(ROW_GROUP))

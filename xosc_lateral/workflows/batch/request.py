@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lxml import etree
 
 from xosc_lateral.base.errors import FormatError, XoscLateralError, absent, meant_for
+from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import PARAMETER_SETS, XML_TREE
 from xosc_lateral.files.openscenario.element import local_name
 from xosc_lateral.files.openscenario.provenance import HEADER_MARK
@@ -24,11 +24,8 @@ from xosc_lateral.files.remote import is_url
 from xosc_lateral.files.source import open_source
 from xosc_lateral.files.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.workflows.conversion.settings import OPTIONS, ConvertSettings
-from xosc_lateral.workflows.inputs import scenarios_at
+from xosc_lateral.workflows.opened import scenarios_at
 from xosc_lateral.workflows.options import Option, as_it_is, whole_number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 class DocumentKind(Enum):

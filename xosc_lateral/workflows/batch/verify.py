@@ -21,10 +21,9 @@ from xosc_lateral.files.output_paths import claim, output_file, output_folder, p
 from xosc_lateral.files.profiles import profile_hash, read_profile
 from xosc_lateral.files.source import check_regular, file_hash, hash_of, read_source
 from xosc_lateral.workflows.batch.batch import convert_many
-from xosc_lateral.workflows.batch.guard import JobLimits, within_limits
 from xosc_lateral.workflows.batch.jobs import Batch, Fingerprints, Job
 from xosc_lateral.workflows.batch.manifest import MANIFEST, ManifestRow, read_manifest
-from xosc_lateral.workflows.batch.workers import WorkerDiedError, open_pool, run_tasks
+from xosc_lateral.workflows.batch.workers import JobLimits, WorkerDiedError, open_pool, run_tasks, within_limits
 from xosc_lateral.workflows.conversion.convert import convert_scenario
 from xosc_lateral.workflows.conversion.result import ConversionProvenance
 from xosc_lateral.workflows.conversion.settings import AUTO, AUTO_PROFILE, ConvertSettings

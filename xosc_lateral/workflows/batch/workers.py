@@ -1,4 +1,4 @@
-"""Where jobs run: in this process, in processes on this machine's cores, on a dask.distributed cluster.
+"""What a job may take, and where jobs run: in this process, in processes on this machine's cores, on a dask cluster.
 
 Each task runs in a process with limits (`base/process.py`), also on a cluster: one that takes its process down costs
 its own row, and is tried again, for a process may be killed from outside as well.
@@ -18,19 +18,66 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
+from dataclasses import dataclass
 from functools import cache
 from itertools import islice
+from pathlib import Path
 from typing import Any, Self, TypeVar, cast
 
 from xosc_lateral.base.errors import XoscLateralError
-from xosc_lateral.base.process import ProcessEndedError, Processes, cores
-from xosc_lateral.base.signals import Interrupted, pending_signal
+from xosc_lateral.base.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.base.process import ProcessEndedError, Processes, address_space, cores
+from xosc_lateral.base.signals import Interrupted, TimeOver, pending_signal, time_limit
 from xosc_lateral.base.version import __version__
-from xosc_lateral.workflows.batch.guard import JobLimits
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
+
+# ---- what one job may take: work that exceeds it ends as an error of that job ----
+class JobLimitError(XoscLateralError):
+    """A job took more time or memory than it may."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobLimits:
+    """What one job may take: time [s], and memory on top of what the process has when the job begins [MB]."""
+
+    timeout: float = JOB_TIMEOUT.value
+    memory: float = JOB_MEMORY.value
+    fixed: bool = False  # The verb has no options that raise them.
+
+    @property
+    def too_much(self) -> str:
+        """Why a job was ended that took more memory."""
+        return f"took more than {self.memory:g} MB of memory" + "; --job-limit raises the limit" * (not self.fixed)
+
+    @property
+    def too_long(self) -> str:
+        """Why a job was ended that took more time."""
+        return f"took longer than {self.timeout:g} s" + "; --job-limit raises the limit" * (not self.fixed)
+
+
+def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:
+    """Run ``work(task)``. Raises `JobLimitError`: it took too long, or too much memory."""
+    try:
+        with address_space(limits.memory), time_limit(limits.timeout):
+            return work(task)
+    except MemoryError as error:
+        raise JobLimitError(limits.too_much) from error
+    except TimeOver as error:
+        raise JobLimitError(limits.too_long) from error
+
+
+def for_one(work: Callable[[Path], Result], path: Path, limits: JobLimits | None = None) -> Result:
+    """``work(path)`` within limits, else those of a batch's scenario. Raises `JobLimitError`, which names the file."""
+    try:
+        return within_limits(work, path, limits or JobLimits(fixed=True))
+    except JobLimitError as error:
+        raise JobLimitError(f"{path}: {error}") from error
+
+
+# ---- where jobs run ----
 TASKS_AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
 

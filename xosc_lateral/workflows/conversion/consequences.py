@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray
-from xosc_lateral.base.rows import blocks, slices_where
+from xosc_lateral.base.arrays import BoolArray, blocks, slices_where
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, LaneDeparture
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion
 from xosc_lateral.world.motion.segments import Crossing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -13,15 +13,12 @@ from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.plugins import service
 from xosc_lateral.base.texts import counted
 from xosc_lateral.drivers.model.profile import SIDES, UNMEASURED_RESPONSES, Basis
-from xosc_lateral.files.atomic import together
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.output_paths import claim, label_files, output_file
+from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.workflows.conversion.result import MODE_WORDS, ConvertedScenario
 from xosc_lateral.workflows.result import PathLike, Result, write_page
 from xosc_lateral.world.motion.nominal import Activity
-
-if TYPE_CHECKING:
-    from xosc_lateral.files.pages.figure import Figure
-
 
 _PLACE = ("what", "path", "line", "element")
 
@@ -182,7 +179,6 @@ class Conversion(ConvertedScenario, Result):
 
     def write_summary(self, path: PathLike, *, force: bool = False) -> Path:
         """Write Markdown with the numbers, and beside it the two pictures that it shows."""
-        from xosc_lateral.files.atomic import write_atomically
         from xosc_lateral.workflows.conversion.summary import SUMMARY_SUFFIXES, pictures_beside, summary_of
 
         output = output_file(path, f"{(self.output or self.source).stem}.md", SUMMARY_SUFFIXES)
@@ -194,8 +190,6 @@ class Conversion(ConvertedScenario, Result):
 
     def write_labels(self, beside: PathLike, *, force: bool = False) -> tuple[Path, Path]:
         """Write OpenLABEL tags and an ASAM quality result beside an output: ``NAME.openlabel.json``, ``NAME.xqar``."""
-        from xosc_lateral.files.atomic import write_atomically
-
         tags, quality = label_files(Path(beside))
         claim([tags, quality], [self.source], force=force)
         with together():

@@ -37,7 +37,7 @@ from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enric
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
 from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, phases_of, provenance_of, write
-from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
+from xosc_lateral.workflows.opened import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.look import compare_parts, worst_of

@@ -13,11 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, blocks
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.own_clock import is_slow, ticks_of, way_of
-from xosc_lateral.base.rows import blocks
-from xosc_lateral.base.segment import Segment
+from xosc_lateral.base.segment import Segment, is_slow, ticks_of, way_of
 from xosc_lateral.drivers.model.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.drivers.model.sampled_offsets import FUTURE_CONTEXT, PAST_CONTEXT
 from xosc_lateral.drivers.model.sampling import Responses, responses_to
@@ -111,7 +109,7 @@ def seen_by(
 
 
 def _knots(entity: EntityMotion, driven: FloatArray, rows: slice, every: int) -> tuple[IntArray, FloatArray]:
-    """Rows that are sampled, and the distance driven there [m]: a step apart on the driver's clock (`own_clock`).
+    """Rows that are sampled, and the distance driven there [m]: a step apart on the driver's clock (`base.segment`).
 
     Below 40 km/h these are further apart in time, and those between rows are named by the nearest; the last then lies
     behind the end, where the car would go on as it does there.

@@ -9,12 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
-from xosc_lateral.base.own_clock import within_heading
-from xosc_lateral.base.rows import BLOCK, blocks, columns
-from xosc_lateral.drivers.model.maneuvers import Maneuvers
+from xosc_lateral.base.arrays import BLOCK, FloatArray, IntArray, blocks, columns
+from xosc_lateral.base.segment import within_heading
 from xosc_lateral.drivers.model.plausibility import check_offsets, drivable
-from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.drivers.model.profile import DriverProfile, Maneuvers
 from xosc_lateral.drivers.model.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.drivers.model.sampling import OffsetSampler
 from xosc_lateral.drivers.model.seeds import of_driver

@@ -33,11 +33,7 @@ from xosc_lateral.world.motion.look import look_at, rests_beside
 from xosc_lateral.world.motion.nominal import POSE, EntityMotion, NominalMotion
 from xosc_lateral.world.player.player import play
 from xosc_lateral.world.scenario.conditions import StoryboardElementStateCondition, at_time
-from xosc_lateral.world.scenario.enums import (
-    ConditionEdge,
-    StoryboardElementState,
-    StoryboardElementType,
-)
+from xosc_lateral.world.scenario.enums import ConditionEdge, StoryboardElementState, StoryboardElementType
 from xosc_lateral.world.scenario.scenario import (
     Condition,
     ConditionGroup,

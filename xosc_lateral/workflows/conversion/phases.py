@@ -12,9 +12,9 @@ import numpy as np
 from msgspec import structs
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.own_clock import way_of as way_of_clock
-from xosc_lateral.base.own_clock import within_heading
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.base.segment import way_of as way_of_clock
+from xosc_lateral.base.segment import within_heading
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.files.openscenario.write.reactive import END_MARGIN, FIRST_WAIT, REACHED
 from xosc_lateral.workflows.conversion.across import lane_changes_of, why_kept, why_untouched
 from xosc_lateral.workflows.conversion.consequences import stays_as_written

@@ -19,7 +19,7 @@ from xosc_lateral.files.openscenario.read import RoadSearch
 from xosc_lateral.files.openscenario.write.draft import Player, TargetPlayer, target
 from xosc_lateral.workflows import options as say
 from xosc_lateral.workflows.conversion.result import LaneChanges, Neighbours
-from xosc_lateral.workflows.inputs import RoadLike
+from xosc_lateral.workflows.opened import RoadLike
 from xosc_lateral.workflows.options import STEP, Option, PathLike, Paths, ProfileLike, option
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from math import inf
 import numpy as np
 from msgspec import Struct
 
+from xosc_lateral.base.arrays import rate
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.rates import rate
 from xosc_lateral.workflows.conversion.result import EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.look import STORY_PREFIX, Finding

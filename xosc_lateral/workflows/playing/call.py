@@ -13,7 +13,7 @@ from xosc_lateral.base.note import Note, notes
 from xosc_lateral.base.plugins import service
 from xosc_lateral.files.output_paths import claim, output_file
 from xosc_lateral.files.source import file_hash, parsed_hashes
-from xosc_lateral.workflows.inputs import DocumentLike, RoadLike, scenario_input
+from xosc_lateral.workflows.opened import DocumentLike, RoadLike, scenario_input
 from xosc_lateral.workflows.options import STEP, declare_options, flag
 from xosc_lateral.workflows.result import PathLike, Paths, Result, as_paths, write_page
 

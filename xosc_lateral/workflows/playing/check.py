@@ -10,9 +10,8 @@ from math import inf
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array
+from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray, Int32Array, blocks, rows_where
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.rows import blocks, rows_where
 from xosc_lateral.world.motion.gaps import box_distance, corners
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion
 from xosc_lateral.world.player.distances import HEIGHT_APART

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.files.atomic import write_atomically
 from xosc_lateral.files.output_paths import PACKAGE, SVG_MARK, claim, output_file
-from xosc_lateral.files.pages.chart import INK, Panel, color_of, label_of
-from xosc_lateral.files.pages.figure import Figure
+from xosc_lateral.files.pages.chart import INK, PAPER, Panel, color_of, label_of
+from xosc_lateral.files.pages.figure import TEXT_SIZE, Figure
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 
 IMAGE_SUFFIXES, ANIMATION_SUFFIXES = (".svg", ".png"), (".gif",)
 
@@ -177,8 +183,6 @@ def write_image(
     figure = shown.picture(time)
     if output.suffix.lower() == ".svg":
         return write_atomically(output, marked(figure.svg()))
-    from xosc_lateral.files.pages.raster import rasters
-
     (image,) = rasters([figure])
     from PIL.PngImagePlugin import PngInfo
 
@@ -193,8 +197,6 @@ def write_animation(
     scene: str, path: str | Path, *, usual_name: str, inputs: Iterable[Path] = (), force: bool = False
 ) -> Path:
     """Write the whole run as ``.gif`` (extra `pictures`), in real time."""
-    from xosc_lateral.files.pages.raster import rasters
-
     output = output_file(path, f"{usual_name}.gif", ANIMATION_SUFFIXES)
     claim([output], inputs, force=force)
     shown = PictureScene(scene)
@@ -214,3 +216,37 @@ def write_animation(
     data, step = BytesIO(), round(1000 * GIF_STEP)
     frames[0].save(data, "GIF", save_all=True, append_images=frames[1:], duration=step, loop=0, comment=PACKAGE)
     return write_atomically(output, data.getvalue())
+
+
+# ---- figures as pixels, by resvg and Pillow: same figure, same pixels ----
+DPI = 108.0
+"""1.5 pixels to a point of a figure."""
+
+
+def rasters(figures: Iterable[Figure]) -> Iterator[Image]:
+    """Pixels of each figure.
+
+    Raises
+    ------
+    XoscLateralError
+        Pillow or resvg is not installed.
+    """
+    try:
+        from PIL import Image, ImageFont
+        from resvg_py import svg_to_bytes
+    except ImportError as error:
+        raise XoscLateralError(
+            "PNG and GIF need Pillow and resvg: pip install 'xosc-lateral[pictures]'; .svg does not"
+        ) from error
+    font = ImageFont.load_default(TEXT_SIZE)
+    assert isinstance(font, ImageFont.FreeTypeFont)
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "font.ttf"
+        file.write_bytes(font.font_bytes)  # Pillow's own is the same everywhere; others are for letters that it lacks
+        family = f"svg, text {{ font-family: {font.getname()[0]} }}"
+        for svg in (figure.svg() for figure in figures):
+            pixels = svg_to_bytes(
+                svg_string=svg, dpi=DPI, background=PAPER, style_sheet=family, font_files=[str(file)],
+                skip_system_fonts=svg.isascii(),
+            )  # fmt: skip
+            yield Image.open(BytesIO(pixels)).convert("RGB")

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.arrays import FloatArray, true_slices
 from xosc_lateral.base.track import Track
 from xosc_lateral.workflows.conversion.result import EntityResult
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, MovingTraffic

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
+from xosc_lateral.files.atomic import together, write_atomically
 from xosc_lateral.files.output_paths import claim, output_folder, template_mark
+from xosc_lateral.files.templates import AnyTemplate, all_templates, find_template
+from xosc_lateral.files.templates.template import Parameter
 from xosc_lateral.workflows.result import PathLike, Result
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from xosc_lateral.files.templates import AnyTemplate
-    from xosc_lateral.files.templates.parameter import Parameter
 
 
 def list_templates(name: str | None = None) -> TemplateList:
@@ -26,8 +24,6 @@ def list_templates(name: str | None = None) -> TemplateList:
     XoscLateralError
         If there is none of that name.
     """
-    from xosc_lateral.files.templates import all_templates, find_template
-
     return TemplateList(all_templates() if name is None else (find_template(name),), name is not None)
 
 
@@ -55,9 +51,6 @@ def write_template(name: str, folder: PathLike, *, force: bool = False, **settin
     XoscLateralError
         An unknown template or setting, or a value out of range.
     """
-    from xosc_lateral.files.atomic import together, write_atomically
-    from xosc_lateral.files.templates import find_template
-
     files = find_template(name).files({key: str(value) for key, value in settings.items()})
     output = output_folder(folder)
     paths = {output / file: text for file, text in files.items()}

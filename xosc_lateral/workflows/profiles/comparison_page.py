@@ -1,19 +1,22 @@
-"""Several profiles side by side, as text, JSON and a page."""
+"""Several profiles side by side, as a result with its text, JSON and page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.texts import aligned
 from xosc_lateral.drivers.evaluation import look_words
 from xosc_lateral.drivers.evaluation.lane_keeping import HIGHWAY_DRIVES, HIGHWAY_SPEED
 from xosc_lateral.drivers.evaluation.metrics import METRICS
-from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile
+from xosc_lateral.drivers.evaluation.profile_comparison import Compared, ComparedProfile, compare
 from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.evaluation.sizes import FAST_S, QUANTITIES, SIGNIFICANCE_LEVEL, SLOW_S, Difference, surest
 from xosc_lateral.files.pages.chart import color_of
@@ -22,6 +25,9 @@ from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
 from xosc_lateral.workflows.profiles.cards import figures_record
 from xosc_lateral.workflows.profiles.effect_words import effect_line
+from xosc_lateral.workflows.result import PathLike, Result, write_page
+
+__all__ = ["ProfileComparison", "compare"]
 
 SHOWN_S = 120.0  # Length of the sample paths in the figure. [s]
 PATH_SPACING = 0.8  # Between the zero lines of two sample paths. [m]
@@ -198,3 +204,34 @@ def comparison_page(compared: Compared) -> str:
     return page.html(
         {"seed": compared.seed, **{each.profile.name: profile_hash(each.profile)[:12] for each in compared.profiles}}
     )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ProfileComparison(Result):
+    """Profiles side by side."""
+
+    _compared: Compared
+
+    def headline(self) -> str:
+        """One line."""
+        return ", ".join(self._compared.names)
+
+    def __str__(self) -> str:
+        return comparison_text(self._compared)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
+        names = self._compared.names
+        return pd.DataFrame(self._compared.distance, index=names, columns=names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return comparison_record(self._compared)
+
+    def plot(self) -> Figure:
+        """Spread, spectrum and sample paths side by side."""
+        return comparison_figure(self._compared)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)

@@ -1,13 +1,16 @@
-"""Scores of a profile as text, JSON and a report with the paper's violins."""
+"""Scores of a profile: the result, with its text, JSON and a page with the paper's violins."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from xosc_lateral.base.lazy import pd
+from xosc_lateral.base.note import Note
 from xosc_lateral.base.version import __version__
 from xosc_lateral.drivers.evaluation import spectra
 from xosc_lateral.drivers.evaluation.lane_keeping import NEAR_MARKING
@@ -15,7 +18,6 @@ from xosc_lateral.drivers.evaluation.metrics import METRICS
 from xosc_lateral.drivers.evaluation.realism import Realism
 from xosc_lateral.drivers.evaluation.scores import SNIPPET, ProfileScores, SnippetScores, scores_to_dict
 from xosc_lateral.drivers.model.profile import DriverProfile
-from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.pages.page import Page
 from xosc_lateral.files.profiles import profile_hash
@@ -27,56 +29,14 @@ from xosc_lateral.workflows.profiles.realism_text import (
     realism_lines,
     start_fade_note,
 )
-from xosc_lateral.workflows.profiles.violins import METRIC_WORDS, violin_figure
-
-
-def trace_figure(scores: ProfileScores) -> Figure:
-    """Measured offsets on the left, sampled ones of the same drives on the right, on one scale."""
-    figure = Figure(len(scores.traces), 2, height=50.0, share_x="all", share_y="all")
-    for number, trace in enumerate(scores.traces):
-        sides = ((trace.real, MEASURED, "measured"), (trace.sampled, SAMPLED, "sampled"))
-        for panel, (values, color, label) in zip(figure.row(number), sides, strict=True):
-            panel.level()
-            panel.line(trace.step * np.arange(len(values)), values, color, label=label)
-            panel.title, panel.x.label = f"{trace.drive}, {label}", "time [s]"
-    figure.row(len(scores.traces) // 2)[0].y.label = "offset [m]"
-    return figure
-
-
-def spectrum_figure(scores: ProfileScores) -> Figure:
-    """Power density and autocorrelation, measured and sampled."""
-    figure = Figure(1, 2, height=180.0, legend=True)
-    power, memory = figure.panels
-    memory.level()
-    for each, correlation, color, label in (
-        (scores.spectrum_real, scores.autocorrelation_real, MEASURED, "measured"),
-        (scores.spectrum_sampled, scores.autocorrelation_sampled, SAMPLED, "sampled"),
-    ):
-        power.line(each.frequency, each.density, color, label=label)
-        memory.line(scores.lags, correlation, color, label=label)
-    power.x.log = power.y.log = memory.x.log = True
-    power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
-    memory.title, memory.x.label, memory.y.label = "Autocorrelation", "lag [s]", "correlation [-]"
-    return figure
-
-
-def verdict_figure(verdict: spectra.Verdict) -> Figure:
-    """Ratios of powers over frequency, with intervals: of the driver, and of the recording."""
-    figure = Figure(1, 2, height=130.0, share_x="all", share_y="all")
-    powers = [ratio for ratio in verdict.ratios if ratio.high]
-    ends = min(ratio.low for ratio in powers), max(ratio.high for ratio in powers)
-    for panel, of, color in zip(figure.panels, spectra.BOTH, (SAMPLED, MEASURED), strict=True):
-        panel.title, panel.x.label, panel.x.log, panel.y.log = of, "frequency [Hz]", True, True
-        panel.x.limits = ends
-        panel.area((*ends, *ends[::-1]), (1.0 / spectra.TOLERANCE,) * 2 + (spectra.TOLERANCE,) * 2, color, opacity=0.12)
-        panel.line(ends, (1.0, 1.0), color, width=0.8, dashes="3 2")
-        for each in (ratio for ratio in powers if ratio.of == of):
-            middle = (each.low * each.high) ** 0.5
-            panel.line((middle, middle), each.interval, color)
-            panel.dots((middle,), (each.ratio,), color, size=6.0, label=f"{each.name}, {each.judged}")
-    figure.panels[0].y.label = "sampled over measured"
-    return figure
-
+from xosc_lateral.workflows.profiles.violins import (
+    METRIC_WORDS,
+    spectrum_figure,
+    trace_figure,
+    verdict_figure,
+    violin_figure,
+)
+from xosc_lateral.workflows.result import GivenDrives, PathLike, Result, write_page
 
 VERDICT_SENTENCES = {
     spectra.ALIKE: "moves as other real drivers do", spectra.UNLIKE: "does not move as other real drivers do",
@@ -343,3 +303,74 @@ def _provenance(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[s
         "seed": scores.seed,
         "package_version": __version__,
     }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Result):
+    """Scores of a profile on measured drives."""
+
+    _scores: ProfileScores
+    profile: DriverProfile
+    _tables: GivenDrives
+
+    @property
+    def ratio(self) -> float:
+        """Mean distance of the ten metrics over that between real drivers; 1: as close as these. [-]"""
+        return self._scores.snippets.ratio
+
+    @property
+    def realism(self) -> Realism:
+        """The fair measure: every condition's distances, those between real drivers (`floor`), and classifiers."""
+        return self._scores.realism
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The block that does worst, and its ratio to real drivers; see `to_frame`. [-]"""
+        return worst_block(self._scores)
+
+    @property
+    def messages(self) -> tuple[Note, ...]:
+        """Rows of the tables that are in no drive."""
+        return self._tables.messages
+
+    def headline(self) -> str:
+        """One line."""
+        hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
+        return f"{self.profile.name} on {hours}: " + ", ".join(
+            f"{of} {self.judged(of)}" for of in ("driver", "recording")
+        )
+
+    def judged(self, of: str) -> str:
+        """The "driver", or the "recording", his sensor's error on both sides: "alike", "unlike" or "not known"."""
+        return judged(self._scores, of)
+
+    def __str__(self) -> str:
+        text = evaluation_text(self._scores, self.profile, self._tables.inputs)
+        return "\n".join([text, *self.message_lines()])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
+        rows = [
+            {"seconds": one.seconds, "metric": name, "distance": distance, "floor": one.floor.by_metric[name]}
+            for one in (self._scores.snippets, self._scores.long_snippets)
+            if one is not None
+            for name, distance in one.distances.by_metric.items()
+        ]
+        frame = pd.DataFrame(rows)
+        return frame.assign(ratio=frame["distance"] / frame["floor"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        record = evaluation_record(self._scores, self.profile, self._tables.inputs)
+        return record | {"messages": self.message_records()}
+
+    def plot(self) -> Figure:
+        """Violins of the ten metrics, measured beside sampled."""
+        shown = self._scores.evaluations[3]
+        return violin_figure(shown.real, shown.artificial)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        name, tables = f"{self.profile.name}_evaluation.html", self._tables
+        made = partial(evaluation_page, self._scores, self.profile, tables.inputs)
+        return write_page(path, name, made, inputs=tables.files, force=force)

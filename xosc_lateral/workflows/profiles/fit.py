@@ -1,18 +1,23 @@
-"""`fit`: measured drives into a driver profile; `read_drives`: the drives themselves."""
+"""`fit`: measured drives into a profile; `read_drives`: the drives themselves; `evaluate`: how true one is to them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from xosc_lateral.workflows.options import declare_options, flag
+from msgspec.structs import replace
+
+from xosc_lateral.base.errors import DriverProfileError
+from xosc_lateral.drivers.model.profile import DriverProfile, Maneuvers, Provenance
+from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import DrivesLike, PathLike, Paths, ProfileLike, given_drives, given_profile, naming
 
 if TYPE_CHECKING:
-    from xosc_lateral.drivers.drives.drive import Drive
-    from xosc_lateral.drivers.model.maneuvers import Maneuvers
-    from xosc_lateral.drivers.model.profile import DriverProfile
+    from xosc_lateral.drivers.drives.drive import Drive, Run
     from xosc_lateral.files.mapping import MappingLike
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
+
 
 PRIOR_PROFILE = "rural"
 """Profile of the library whose fast movement stands in where a recording shows none: fitted to differential GNSS."""
@@ -39,7 +44,6 @@ def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[
 
 
 def _known_model(text: str) -> str:
-    from xosc_lateral.base.errors import DriverProfileError
     from xosc_lateral.drivers.model.core.registry import model_named
 
     try:
@@ -91,16 +95,12 @@ def fit(
         Whose fast movement the profile has above the band that the drives show: `rural` where tables state a band
         below 0.5 Hz and no other table has one above it, another one also where the sensor hides the driver.
     """
-    from msgspec.structs import replace
-
-    from xosc_lateral.base.errors import DriverProfileError
     from xosc_lateral.drivers.drives.cleaning import summary_of
     from xosc_lateral.drivers.fitting.fitting import fit_profile
     from xosc_lateral.drivers.fitting.models.two_level import correct_two_level
     from xosc_lateral.drivers.model.core.base import ModelKind
     from xosc_lateral.drivers.model.core.registry import model_named
     from xosc_lateral.drivers.model.core.two_level.model import TwoLevelModel
-    from xosc_lateral.drivers.model.profile import Provenance
     from xosc_lateral.files.source import parsed_hashes
 
     if sensor_noise is not None and not LEAST_NOISE <= sensor_noise <= MOST_NOISE:
@@ -142,7 +142,6 @@ def fit(
 def _law_of(maneuvers: Maneuvers | PathLike, road: PathLike | None) -> Maneuvers:
     """Of a recording, which an extra reads."""
     from xosc_lateral.base.plugins import service
-    from xosc_lateral.drivers.model.maneuvers import Maneuvers
 
     if isinstance(maneuvers, Maneuvers):
         return maneuvers
@@ -155,3 +154,50 @@ def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> l
     from xosc_lateral.drivers.fitting import fitting
 
     return fitting.fit_warnings(profile, sensor_noise, given_profile(PRIOR_PROFILE))
+
+
+@declare_options
+def evaluate(
+    profile: Annotated[ProfileLike, PROFILE],
+    drives: DrivesLike,
+    *,
+    seed: int = 0,
+    classify: Annotated[
+        bool, flag("--classify/--no-classify", help="Also train classifiers (extra `classifier`).")
+    ] = True,
+    columns: MappingLike | None = None,
+    library: Paths = (),
+) -> Evaluation:
+    """Score a profile beside other real drivers, and by the paper's four evaluations.
+
+    Raises `NotEnoughDataError`: Too little is left after cutting to compare.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    drives, columns
+        See `read_drives`.
+    classify : bool
+        Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
+    """
+    from xosc_lateral.drivers.drives.drive import all_runs
+    from xosc_lateral.drivers.evaluation.scores import score_profile
+    from xosc_lateral.workflows.profiles.evaluation_page import Evaluation
+
+    driver = given_profile(profile, library)
+    tables = given_drives(drives, columns)
+    with naming(tables):
+        runs = all_runs(tables.drives)
+        scores = score_profile(_seen_with(driver, runs, tables.drives), runs, seed=seed, classify=classify)
+    return Evaluation(scores, driver, tables)
+
+
+def _seen_with(driver: DriverProfile, runs: Sequence[Run], drives: Sequence[Drive]) -> DriverProfile:
+    """The profile with the sensor of a recording, as far as it is known; the paper's model knows recordings alone."""
+    from xosc_lateral.drivers.fitting.fitting import driver_runs
+    from xosc_lateral.drivers.model.core.base import ModelKind
+
+    if driver.model.kind == ModelKind.TWO_LEVEL:
+        return driver
+    _, sensor = driver_runs(runs, drives)
+    return driver if sensor is None else replace(driver, sensor=sensor)

@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from msgspec import structs
+
 from xosc_lateral.base.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.base.lazy import pd
+from xosc_lateral.drivers.model.profile import DriverProfile
+from xosc_lateral.files import profiles
 from xosc_lateral.files.output_paths import claim, output_file, output_folder
+from xosc_lateral.files.profiles import Entry, described, matching, own_path, profile_hash, read_library
+from xosc_lateral.files.source import edit_in_place
 from xosc_lateral.workflows.options import declare_options, flag, texts
-from xosc_lateral.workflows.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile, write_page
+from xosc_lateral.workflows.profiles.cards import card_page, list_record, list_text
+from xosc_lateral.workflows.result import (
+    PROFILE_SUFFIXES,
+    PathLike,
+    Paths,
+    ProfileLike,
+    Result,
+    as_paths,
+    given_profile,
+    write_page,
+)
 
 if TYPE_CHECKING:
-    from xosc_lateral.drivers.evaluation.profile_comparison import Compared
     from xosc_lateral.drivers.fitting.derive import Derived
-    from xosc_lateral.drivers.model.profile import DriverProfile
-    from xosc_lateral.files.pages.figure import Figure
-    from xosc_lateral.files.profiles import Entry
-
-PROFILE_SUFFIXES = (".json",)
+    from xosc_lateral.workflows.profiles.comparison_page import ProfileComparison
 
 TAGS = flag("--tag", kind=list[str] | None, metavar="TAG", help="Tag to add; may be repeated.")
 METADATA = flag("--set", kind=list[str] | None, read=texts, metavar="FIELD=VALUE",
@@ -50,8 +61,6 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
 
     Raises `FormatError`: The file is there and no profile that this package wrote.
     """
-    from xosc_lateral.files import profiles
-
     output = output_file(path, f"{profile.name}.json", PROFILE_SUFFIXES)
     claim([output], force=force)
     profiles.write_profile(profile, output)
@@ -60,8 +69,6 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
 
 def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
     """Write a profile's card as a page: what it does, where it comes from, how true it is."""
-    from xosc_lateral.workflows.profiles.cards import card_page
-
     return write_page(path, f"{profile.name}.html", lambda: card_page(profile), force=force)
 
 
@@ -96,12 +103,7 @@ def derive_profile(
     **asked
         Other fields of `fitting.derive.Asked`: ``sdlp_change=0.03``.
     """
-    from dataclasses import replace
-
-    from msgspec import structs
-
     from xosc_lateral.drivers.fitting.derive import Asked, derive, preset_called
-    from xosc_lateral.files.profiles import profile_hash
 
     known = given_profile(base, library)
     chosen = None if preset is None else preset_called(preset)
@@ -126,8 +128,6 @@ def list_profiles(
 
     A file that is no valid profile is listed with what is wrong with it.
     """
-    from xosc_lateral.files.profiles import matching, read_library
-
     entries = read_library(as_paths(library))
     return ProfileList(tuple(matching(entries, tags, where or {}) if tags or where else entries))
 
@@ -146,9 +146,6 @@ def add_profile(
 
     Raises `FormatError`: There is a profile of that id.
     """
-    from xosc_lateral.files import profiles
-    from xosc_lateral.files.profiles import described
-
     folders = [library] if Path(library).is_dir() else []
     added = described(given_profile(profile, folders), name=name, add_tags=tags, fields=metadata)
     output = output_folder(library) / f"{added.name}.json"
@@ -173,10 +170,6 @@ def tag_profile(
 
     Raises `FormatError`: It comes with the package, or can't be read.
     """
-    from xosc_lateral.files import profiles
-    from xosc_lateral.files.profiles import described, own_path
-    from xosc_lateral.files.source import edit_in_place
-
     path = own_path(str(name), as_paths(library))
     changed = described(profiles.read_profile(path), add_tags=add, remove_tags=remove, fields=metadata)
     edit_in_place(path)
@@ -195,7 +188,7 @@ def compare_profiles(*profiles: ProfileLike, library: Paths = (), seed: int = 0)
     seed : int
         Of the free runs that are compared.
     """
-    from xosc_lateral.drivers.evaluation.profile_comparison import compare
+    from xosc_lateral.workflows.profiles.comparison_page import ProfileComparison, compare
 
     if len(profiles) < 2:
         raise ValueError(f"{len(profiles)} profile to compare, two are needed")
@@ -225,8 +218,6 @@ class ProfileList(Result):
         return f"{len(self.names)} profiles{f', {broken} that cannot be read' if broken else ''}"
 
     def __str__(self) -> str:
-        from xosc_lateral.workflows.profiles.cards import list_text
-
         return list_text(self.entries)
 
     def to_frame(self) -> pd.DataFrame:
@@ -235,61 +226,17 @@ class ProfileList(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.workflows.profiles.cards import list_record
-
         return {"profiles": list_record(self.entries)}
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class ProfileComparison(Result):
-    """Profiles side by side."""
-
-    _compared: Compared
-
-    def headline(self) -> str:
-        """One line."""
-        return ", ".join(self._compared.names)
-
-    def __str__(self) -> str:
-        from xosc_lateral.workflows.profiles.comparison_page import comparison_text
-
-        return comparison_text(self._compared)
-
-    def to_frame(self) -> pd.DataFrame:
-        """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
-        names = self._compared.names
-        return pd.DataFrame(self._compared.distance, index=names, columns=names)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.workflows.profiles.comparison_page import comparison_record
-
-        return comparison_record(self._compared)
-
-    def plot(self) -> Figure:
-        """Spread, spectrum and sample paths side by side."""
-        from xosc_lateral.workflows.profiles.comparison_page import comparison_figure
-
-        return comparison_figure(self._compared)
-
-    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
-        """Write the HTML page."""
-        from xosc_lateral.workflows.profiles.comparison_page import comparison_page
-
-        return write_page(path, "profiles.html", lambda: comparison_page(self._compared), force=force)
-
-
-# ---- Profiles of a library that are removed or get another id, an ----
+# ---- profiles that are removed or get another id, and outputs that used one ----
 @declare_options
 def remove_profiles(names: Sequence[PathLike], library: Paths = ()) -> tuple[Path, ...]:
     """Delete the files of profiles of your own, all or none; those that can't be read go by their id only.
 
     Raises `FormatError`: One comes with the package or another, or the file of a path is no profile.
     """
-    from xosc_lateral.files import profiles
-    from xosc_lateral.files.source import edit_in_place
-
-    paths = [profiles.own_path(str(name), as_paths(library)) for name in names]
+    paths = [own_path(str(name), as_paths(library)) for name in names]
     for name, path in zip(names, paths, strict=True):
         if str(name) != path.stem:  # a file of any folder
             profiles.read_profile(path)
@@ -308,11 +255,8 @@ def rename_profile(name: PathLike, new: str, library: Paths = (), *, force: bool
 
     Raises `FormatError`: It comes with the package or another, can't be read, or there is a profile of the new id.
     """
-    from xosc_lateral.files import profiles
-    from xosc_lateral.files.source import edit_in_place
-
-    path = profiles.own_path(str(name), as_paths(library))
-    renamed = profiles.described(profiles.read_profile(path), name=new)
+    path = own_path(str(name), as_paths(library))
+    renamed = described(profiles.read_profile(path), name=new)
     output = path.with_name(f"{renamed.name}.json")
     same = output.exists() and output.samefile(path)
     if output.exists() and not force and not same and output.read_bytes() != profiles.profile_bytes(renamed):
@@ -375,12 +319,11 @@ def find_uses(name: str, outputs: Paths, library: Paths = ()) -> ProfileUses:
     outputs : path or paths
         Folders that batches wrote, or their manifests.
     """
-    from xosc_lateral.files.profiles import profile_hash, read_profile
     from xosc_lateral.workflows.batch.manifest import MANIFEST, read_manifest
 
     now: str | None
     try:
-        now = profile_hash(read_profile(name, as_paths(library)))
+        now = profile_hash(profiles.read_profile(name, as_paths(library)))
     except DriverProfileError:
         now = None
     except (XoscLateralError, OSError):

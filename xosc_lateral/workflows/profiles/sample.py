@@ -11,13 +11,13 @@ import numpy as np
 
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, warnings
-from xosc_lateral.drivers.drives.drive import Drive
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP, Drive
 from xosc_lateral.files.drives import file_label
 from xosc_lateral.files.mapping import MappingLike, TableMapping, as_mapping, plain_header
+from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
+from xosc_lateral.files.pages.figure import Figure
 from xosc_lateral.files.tables import context_of_table, read_table
-from xosc_lateral.workflows.inputs import several
-from xosc_lateral.workflows.opened import opened
+from xosc_lateral.workflows.opened import opened, several
 from xosc_lateral.workflows.options import PROFILE, declare_options, flag
 from xosc_lateral.workflows.result import (
     DrivesLike,
@@ -33,7 +33,6 @@ from xosc_lateral.workflows.result import (
 if TYPE_CHECKING:
     from xosc_lateral.drivers.model.profile import DriverProfile
     from xosc_lateral.drivers.model.sampled_offsets import SampledOffsets
-    from xosc_lateral.files.pages.figure import Figure
 
 
 @declare_options
@@ -160,8 +159,6 @@ class Offsets(Result):
         """Columns `drive`, `time` [s], `offset`, `lane_width` [m], `speed` [m/s] where known; of snippets also
         `snippet` and `offset_real` [m]. `following_run` counts what is cut apart: the table can be fitted as it is.
         """
-        import numpy as np
-
         from xosc_lateral.drivers.drives.cleaning import RUN
 
         lengths = [len(each.time) for each in self._made]
@@ -189,9 +186,6 @@ class Offsets(Result):
 
     def plot(self, *, most: int = 6) -> Figure:
         """Offset over time of the first runs; measured ones beside them where there are any."""
-        from xosc_lateral.files.pages.chart import MEASURED, SAMPLED
-        from xosc_lateral.files.pages.figure import Figure
-
         sampled = self._made[:most]
         figure = Figure(max(1, len(sampled)), height=75.0, legend=True)
         for panel, drive in zip(figure.panels, sampled, strict=False):

@@ -1,11 +1,13 @@
-"""Violins: the ten metrics of measured snippets beside those of sampled ones."""
+"""Figures of an evaluation: violins (the ten metrics, measured beside sampled), traces, spectra, the verdict."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.evaluation import spectra
 from xosc_lateral.drivers.evaluation.metrics import METRICS
+from xosc_lateral.drivers.evaluation.scores import ProfileScores
 from xosc_lateral.files.pages.chart import DASHED, MEASURED, MUTED, SAMPLED
 from xosc_lateral.files.pages.figure import Figure
 
@@ -74,3 +76,51 @@ def _density(values: FloatArray, grid: FloatArray) -> FloatArray:
     kernel = np.exp(-0.5 * (np.arange(-len(grid) + 1, len(grid)) * step / width) ** 2)
     start = len(grid) - 1
     return np.convolve(counts, kernel)[start : start + len(grid)] + 1e-12
+
+
+def trace_figure(scores: ProfileScores) -> Figure:
+    """Measured offsets on the left, sampled ones of the same drives on the right, on one scale."""
+    figure = Figure(len(scores.traces), 2, height=50.0, share_x="all", share_y="all")
+    for number, trace in enumerate(scores.traces):
+        sides = ((trace.real, MEASURED, "measured"), (trace.sampled, SAMPLED, "sampled"))
+        for panel, (values, color, label) in zip(figure.row(number), sides, strict=True):
+            panel.level()
+            panel.line(trace.step * np.arange(len(values)), values, color, label=label)
+            panel.title, panel.x.label = f"{trace.drive}, {label}", "time [s]"
+    figure.row(len(scores.traces) // 2)[0].y.label = "offset [m]"
+    return figure
+
+
+def spectrum_figure(scores: ProfileScores) -> Figure:
+    """Power density and autocorrelation, measured and sampled."""
+    figure = Figure(1, 2, height=180.0, legend=True)
+    power, memory = figure.panels
+    memory.level()
+    for each, correlation, color, label in (
+        (scores.spectrum_real, scores.autocorrelation_real, MEASURED, "measured"),
+        (scores.spectrum_sampled, scores.autocorrelation_sampled, SAMPLED, "sampled"),
+    ):
+        power.line(each.frequency, each.density, color, label=label)
+        memory.line(scores.lags, correlation, color, label=label)
+    power.x.log = power.y.log = memory.x.log = True
+    power.title, power.x.label, power.y.label = "Spectrum", "frequency [Hz]", "power density [m²/Hz]"
+    memory.title, memory.x.label, memory.y.label = "Autocorrelation", "lag [s]", "correlation [-]"
+    return figure
+
+
+def verdict_figure(verdict: spectra.Verdict) -> Figure:
+    """Ratios of powers over frequency, with intervals: of the driver, and of the recording."""
+    figure = Figure(1, 2, height=130.0, share_x="all", share_y="all")
+    powers = [ratio for ratio in verdict.ratios if ratio.high]
+    ends = min(ratio.low for ratio in powers), max(ratio.high for ratio in powers)
+    for panel, of, color in zip(figure.panels, spectra.BOTH, (SAMPLED, MEASURED), strict=True):
+        panel.title, panel.x.label, panel.x.log, panel.y.log = of, "frequency [Hz]", True, True
+        panel.x.limits = ends
+        panel.area((*ends, *ends[::-1]), (1.0 / spectra.TOLERANCE,) * 2 + (spectra.TOLERANCE,) * 2, color, opacity=0.12)
+        panel.line(ends, (1.0, 1.0), color, width=0.8, dashes="3 2")
+        for each in (ratio for ratio in powers if ratio.of == of):
+            middle = (each.low * each.high) ** 0.5
+            panel.line((middle, middle), each.interval, color)
+            panel.dots((middle,), (each.ratio,), color, size=6.0, label=f"{each.name}, {each.judged}")
+    figure.panels[0].y.label = "sampled over measured"
+    return figure

@@ -1,7 +1,7 @@
 """The driver's clock along a way in its fastest run, and the one bound on how fast movement turns a vehicle.
 
 A path by distance is driven at any speed that an ego allows. Its clock is that of the fastest: what is bounded there is
-bounded everywhere. Live driving has the same bound (`extras.live.paths`).
+bounded everywhere. Live driving has the same bound (`extras.live.moment`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,7 @@ import numpy as np
 from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.own_clock import way_of
-from xosc_lateral.base.segment import MINIMUM_SPEED
+from xosc_lateral.base.segment import MINIMUM_SPEED, way_of
 from xosc_lateral.world.motion.look import FRAME_TURN, LATERAL_ACCELERATION, LOOK_STEP
 from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.motion.trajectory import SETTLING_TIME, distance_driven

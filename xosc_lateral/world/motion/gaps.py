@@ -18,8 +18,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import BLOCK
+from xosc_lateral.base.arrays import BLOCK, BoolArray, FloatArray
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork

@@ -13,9 +13,8 @@ from math import inf
 import numpy as np
 from msgspec import Struct, structs
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, blocks
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.rows import blocks
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IndexArray
+from xosc_lateral.base.arrays import FloatArray, IndexArray, rows_where
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.rows import rows_where
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.road.positions import RouteStep
 from xosc_lateral.world.scenario.entity import BoundingBox, Entity

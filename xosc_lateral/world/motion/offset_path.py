@@ -16,9 +16,8 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.own_clock import within_heading
-from xosc_lateral.base.smoothing import smoothed
+from xosc_lateral.base.arrays import FloatArray, smoothed
+from xosc_lateral.base.segment import within_heading
 from xosc_lateral.world.motion.driver_clock import TICK, DriverClock, leading_time
 from xosc_lateral.world.motion.trajectory import NaturalSpline, settle, smoother_step
 from xosc_lateral.world.motion.way import RoadPlace

@@ -16,8 +16,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, rows_where, slices_where
+from xosc_lateral.base.arrays import BoolArray, FloatArray, blocks, rows_where, slices_where
 from xosc_lateral.world.motion.nominal import Activity
 
 VERTEX_STEP = 0.1

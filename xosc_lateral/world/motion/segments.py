@@ -22,8 +22,7 @@ from math import inf
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks
+from xosc_lateral.base.arrays import BoolArray, FloatArray, blocks
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.private_actions import LaneChangeAction, LaneOffsetAction, LateralDistanceAction

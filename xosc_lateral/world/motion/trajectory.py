@@ -19,8 +19,7 @@ from itertools import pairwise
 import numpy as np
 from msgspec import Struct
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
-from xosc_lateral.base.rows import blocks, columns
+from xosc_lateral.base.arrays import BoolArray, FloatArray, blocks, columns
 from xosc_lateral.base.track import Track
 from xosc_lateral.world.motion.nominal import POSE, Activity, EntityMotion
 from xosc_lateral.world.road.network import RoadNetwork

@@ -13,11 +13,10 @@ from math import cos, hypot, sin
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import BLOCK, FloatArray, columns
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.memory import free_bytes
 from xosc_lateral.base.note import Note
-from xosc_lateral.base.rows import BLOCK, columns
+from xosc_lateral.base.process import free_bytes
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion
 from xosc_lateral.world.player.drive import align_trailers, connect, drive, halt_at_road_end, pull_trailers
 from xosc_lateral.world.player.recorder import NO_LANE

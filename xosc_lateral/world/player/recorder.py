@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from xosc_lateral.base.arrays import BLOCK, BoolArray, FloatArray, Int32Array, IntArray, columns
 from xosc_lateral.base.errors import FormatError, PlaybackError
-from xosc_lateral.base.rows import BLOCK, columns
 from xosc_lateral.world.motion.nominal import MOTION, Activity, EntityMotion
 from xosc_lateral.world.player.state import NO_ROAD, EntityState
 from xosc_lateral.world.road.network import RoadNetwork

@@ -117,13 +117,18 @@ def _horner(series: list[complex], u: float) -> complex:
     return value
 
 
-class Line(Struct, frozen=True):
-    """A straight line from (x, y); [m], heading in [rad]."""
+class Placed(Struct, frozen=True):
+    """What begins at (x, y); [m], heading in [rad]."""
 
     x: float
     y: float
     heading: float
     length: float
+
+
+class Line(Placed, frozen=True):
+    """A straight line."""
+
     cos_heading: float
     sin_heading: float
 
@@ -141,13 +146,9 @@ class Line(Struct, frozen=True):
         return 0.0
 
 
-class Arc(Struct, frozen=True):
-    """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
+class Arc(Placed, frozen=True):
+    """A circular arc, curvature in [1/m]."""
 
-    x: float
-    y: float
-    heading: float
-    length: float
     curvature: float
 
     def at(self, ds: float) -> tuple[float, float, float]:

@@ -21,10 +21,10 @@ from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.base.note import Note
 from xosc_lateral.world.road.index import LANE_TOLERANCE, SAME_LEVEL_HEIGHT, SurfaceIndex, refuse_nan
 from xosc_lateral.world.road.lanes import DRIVING
+from xosc_lateral.world.road.piecewise import HeaderOffset
 from xosc_lateral.world.road.positions import LaneCoordinates, LaneInfo, LaneState, Pose, RoadMark
 from xosc_lateral.world.road.road import Junction, Road, find_lane, lane_at, lane_pose, project_at, surface_pose
 from xosc_lateral.world.road.routes import Routes
-from xosc_lateral.world.road.surface import HeaderOffset
 
 
 class RoadNetwork(SurfaceIndex, Routes):

@@ -15,8 +15,8 @@ from math import asin, atan, atan2, ceil, cos, inf, nan, pi, sin
 from xosc_lateral.base.errors import PlaybackError
 from xosc_lateral.world.road.geometry import Line, ReferenceElement
 from xosc_lateral.world.road.lanes import Lane, LaneSection
+from xosc_lateral.world.road.piecewise import Surface
 from xosc_lateral.world.road.positions import TWO_PI, LaneCoordinates, Pose
-from xosc_lateral.world.road.surface import Surface
 
 
 @dataclass(frozen=True, slots=True)

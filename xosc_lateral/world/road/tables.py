@@ -19,11 +19,10 @@ from numpy.typing import ArrayLike
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.world.road.lane_tables import LaneProfile, LaneTables
 from xosc_lateral.world.road.lanes import Lane
-from xosc_lateral.world.road.piecewise import IndexLike, Lookup, PiecewiseCubic
+from xosc_lateral.world.road.piecewise import GRADE_STEP, IndexLike, Lookup, PiecewiseCubic
 from xosc_lateral.world.road.positions import Poses
 from xosc_lateral.world.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.world.road.road import Road
-from xosc_lateral.world.road.surface import GRADE_STEP
 
 
 class Cubics:

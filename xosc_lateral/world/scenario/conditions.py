@@ -41,11 +41,15 @@ class VariableCondition(Content, frozen=True):
     rule: enums.Rule
 
 
-class SimulationTimeCondition(Content, frozen=True):
-    """[s]"""
+class AgainstNumber(Content, frozen=True):
+    """Something against a number."""
 
     value: AnyNumber
     rule: enums.Rule
+
+
+class SimulationTimeCondition(AgainstNumber, frozen=True):
+    """[s]"""
 
 
 def at_time(moment: float, name: str, place: Place) -> Trigger:
@@ -110,11 +114,9 @@ class OffroadCondition(Content, frozen=True):
     duration: float
 
 
-class Measured(Content, frozen=True, kw_only=True):
+class Measured(AgainstNumber, frozen=True, kw_only=True):
     """A distance, or what is made of one, against a value. `along_route` (1.0) None: not said."""
 
-    value: AnyNumber
-    rule: enums.Rule
     freespace: No
     coordinate_system: enums.CoordinateSystem | None = None
     distance_type: Annotated[enums.RelativeDistanceType | None, DistanceType] = None
@@ -134,11 +136,9 @@ class TimeToCollisionCondition(Measured, frozen=True):
     target: str | Position
 
 
-class AccelerationCondition(Content, frozen=True):
+class AccelerationCondition(AgainstNumber, frozen=True):
     """[m/s2]; `direction` None: the magnitude."""
 
-    value: AnyNumber
-    rule: enums.Rule
     direction: enums.DirectionalDimension | None = None
 
 
@@ -148,11 +148,9 @@ class StandStillCondition(Content, frozen=True):
     duration: float
 
 
-class SpeedCondition(Content, frozen=True):
+class SpeedCondition(AgainstNumber, frozen=True):
     """[m/s]; `direction` None: the scalar speed."""
 
-    value: AnyNumber
-    rule: enums.Rule
     direction: enums.DirectionalDimension | None = None
 
 
@@ -181,12 +179,10 @@ class DistanceCondition(Measured, frozen=True):
     position: Position
 
 
-class RelativeDistanceCondition(Content, frozen=True):
+class RelativeDistanceCondition(AgainstNumber, frozen=True):
     """Distance to an entity. [m]"""
 
     entity_ref: EntityRef
-    value: AnyNumber
-    rule: enums.Rule
     freespace: No
     distance_type: Annotated[enums.RelativeDistanceType, DistanceType] = enums.RelativeDistanceType.EUCLIDIAN
     coordinate_system: enums.CoordinateSystem | None = None

@@ -22,6 +22,12 @@ class Orientation(Struct, frozen=True):
     type: ReferenceContext | None = None
 
 
+class Oriented(Content, frozen=True, kw_only=True):
+    """A place with an orientation; None: as the road, or the entity, there."""
+
+    orientation: Orientation | None = None
+
+
 class WorldPosition(Content, frozen=True):
     """In world coordinates [m], [rad]; None where the file has none."""
 
@@ -33,55 +39,49 @@ class WorldPosition(Content, frozen=True):
     r: float | None = None
 
 
-class RelativeWorldPosition(Content, frozen=True):
-    """World axes, from an entity's reference point; without dz, on the road. [m]"""
+class FromEntity(Oriented, frozen=True):
+    """From an entity's reference point; without dz, on the road. [m]"""
 
     entity_ref: EntityRef
     dx: Zero
     dy: Zero
     dz: float | None = None
-    orientation: Orientation | None = None
 
 
-class RelativeObjectPosition(Content, frozen=True):
-    """The entity's own axes, from its reference point; without dz, on the road. [m]"""
-
-    entity_ref: EntityRef
-    dx: Zero
-    dy: Zero
-    dz: float | None = None
-    orientation: Orientation | None = None
+class RelativeWorldPosition(FromEntity, frozen=True):
+    """Along the world's axes."""
 
 
-class RoadPosition(Content, frozen=True):
+class RelativeObjectPosition(FromEntity, frozen=True):
+    """Along the entity's own axes."""
+
+
+class RoadPosition(Oriented, frozen=True):
     """Road coordinates. [m]"""
 
     road_id: RoadId
     s: float
     t: Zero
-    orientation: Orientation | None = None
 
 
-class RelativeRoadPosition(Content, frozen=True):
+class RelativeRoadPosition(Oriented, frozen=True):
     """Road coordinates from an entity's. [m]"""
 
     entity_ref: EntityRef
     ds: float
     dt: float
-    orientation: Orientation | None = None
 
 
-class LanePosition(Content, frozen=True):
+class LanePosition(Oriented, frozen=True):
     """Lane coordinates; `offset` along +t as the standard has it. [m]"""
 
     road_id: RoadId
     lane_id: int
     s: float
     offset: float = 0.0
-    orientation: Orientation | None = None
 
 
-class RelativeLanePosition(Content, frozen=True):
+class RelativeLanePosition(Oriented, frozen=True):
     """Lane coordinates from an entity's: `d_lane` lanes, and `ds` along the road or `ds_lane` along its lane. [m]"""
 
     entity_ref: EntityRef
@@ -89,7 +89,6 @@ class RelativeLanePosition(Content, frozen=True):
     ds: float | None = None
     ds_lane: float | None = None
     offset: float = 0.0
-    orientation: Orientation | None = None
 
 
 class FromCurrentEntity(Struct, frozen=True):
@@ -116,30 +115,27 @@ class FromLaneCoordinates(Struct, frozen=True):
 InRoutePosition = FromCurrentEntity | FromRoadCoordinates | FromLaneCoordinates
 
 
-class RoutePosition(Content, frozen=True):
+class RoutePosition(Oriented, frozen=True):
     """On a route. `route` None: the reference is missing (an error of the file that the player names)."""
 
     route: Route | None
     in_route: InRoutePosition | None
-    orientation: Orientation | None = None
 
 
-class TrajectoryPosition(Content, frozen=True):
+class TrajectoryPosition(Oriented, frozen=True):
     """On a trajectory. [m]"""
 
     trajectory: Annotated[Trajectory, called("")]
     s: float
     t: float = 0.0
-    orientation: Orientation | None = None
 
 
-class GeoPosition(Content, frozen=True):
+class GeoPosition(Oriented, frozen=True):
     """Latitude and longitude [rad] (degree attributes of 1.2 are converted), height [m]."""
 
     latitude: float
     longitude: float
     altitude: Annotated[float | None, called("altitude", "height")] = None
-    orientation: Orientation | None = None
 
 
 Position = (

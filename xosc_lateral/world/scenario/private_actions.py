@@ -79,17 +79,22 @@ class SpeedProfileAction(Content, frozen=True):
     constraints: DynamicConstraints | None = None
 
 
-class LongitudinalDistanceAction(Content, frozen=True):
-    """Keep a distance [m] or time gap [s] to an entity; both None: the present distance."""
+class KeptDistance(Content, frozen=True):
+    """Keep a distance [m] to an entity."""
 
     entity_ref: EntityRef
     continuous: No
     freespace: No
     distance: float | None = None
-    time_gap: float | None = None
-    displacement: enums.LongitudinalDisplacement | None = None
     coordinate_system: enums.CoordinateSystem | None = None
     constraints: DynamicConstraints | None = None
+
+
+class LongitudinalDistanceAction(KeptDistance, frozen=True):
+    """Along the road, or a time gap [s]; both None: the present distance."""
+
+    time_gap: float | None = None
+    displacement: enums.LongitudinalDisplacement | None = None
 
 
 class AbsoluteTargetLane(Struct, frozen=True):
@@ -135,16 +140,10 @@ class LaneOffsetAction(Content, frozen=True):
     max_lateral_acc: float | None = None
 
 
-class LateralDistanceAction(Content, frozen=True):
-    """Keep a lateral distance [m] to an entity; `distance` None: the present one."""
+class LateralDistanceAction(KeptDistance, frozen=True):
+    """Across the road; `distance` None: the present one."""
 
-    entity_ref: EntityRef
-    continuous: No
-    freespace: No
-    distance: float | None = None
     displacement: enums.LateralDisplacement = enums.LateralDisplacement.ANY
-    coordinate_system: enums.CoordinateSystem | None = None
-    constraints: DynamicConstraints | None = None
 
 
 class SteadyState(Struct, frozen=True):

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from examples.driver_simulator.simulator import simulate_drive
 from tests.kit.runs import made_run
 from xosc_lateral.base.errors import DriverProfileError, NotEnoughDataError
-from xosc_lateral.drivers.drives.resampling import resample
+from xosc_lateral.drivers.drives.drive import resample
 from xosc_lateral.drivers.fitting.fitting import fit_runs, fit_warnings
 from xosc_lateral.drivers.fitting.sensor.periodogram import quantisation_step, rounding_density
 from xosc_lateral.drivers.fitting.sensor.separation import separate

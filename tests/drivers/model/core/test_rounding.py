@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from tests.kit.core_models import POPULATION
-from xosc_lateral.base.numbers import significant
+from xosc_lateral.base.arrays import significant
 from xosc_lateral.drivers.fitting.models.autoregressive_fit import DIGITS, rounded
 from xosc_lateral.drivers.model.core.autoregressive.parameters import Autoregression
 from xosc_lateral.drivers.model.records import plain

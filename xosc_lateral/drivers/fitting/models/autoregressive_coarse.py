@@ -17,8 +17,8 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.fitting.models.likelihood import fit_autoregression
 from xosc_lateral.drivers.model.core.autoregressive.parameters import (
     COARSE_EVERY,

@@ -28,9 +28,8 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.lib.stride_tricks import sliding_window_view
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import FloatArray, all_significant, significant
 from xosc_lateral.base.errors import NotEnoughDataError
-from xosc_lateral.base.numbers import all_significant, significant
 from xosc_lateral.drivers.drives.filters import Detrend, periodograms
 from xosc_lateral.drivers.fitting.models.autoregressive_coarse import (
     DEFAULT_SETTINGS,

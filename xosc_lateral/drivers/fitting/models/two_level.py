@@ -14,8 +14,8 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.drivers.drives.drive import in_digits
 from xosc_lateral.drivers.drives.filters import periodograms
-from xosc_lateral.drivers.drives.resampling import in_digits
 from xosc_lateral.drivers.model.core.base import KERNEL_TAPS, N_KNOTS, NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drivers.model.core.two_level.model import (
     N_BINS,

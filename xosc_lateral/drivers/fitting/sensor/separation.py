@@ -15,9 +15,8 @@ from functools import partial
 
 import numpy as np
 
-from xosc_lateral.base.arrays import FloatArray
+from xosc_lateral.base.arrays import NORMAL_95, FloatArray, all_significant, significant
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.base.numbers import NORMAL_95, all_significant, significant
 from xosc_lateral.drivers.drives.filters import mirrored, scale_frequencies
 from xosc_lateral.drivers.fitting.sensor.likelihood import Colour, Known, SensorData, Solution, density, solve
 from xosc_lateral.drivers.fitting.sensor.periodogram import (

@@ -46,9 +46,13 @@ from xosc_lateral.extras.recordings.cuts import (
     number_runs,
 )
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
-from xosc_lateral.extras.recordings.lanes_from_tracks import LaneCentreLine, fit_lane_centre
+from xosc_lateral.extras.recordings.lines_from_tracks import (
+    LaneCentreLine,
+    ReferenceLine,
+    fit_lane_centre,
+    fit_reference_line,
+)
 from xosc_lateral.extras.recordings.neighbours import find_neighbours
-from xosc_lateral.extras.recordings.reference_line import ReferenceLine, fit_reference_line
 from xosc_lateral.files.source import open_source
 from xosc_lateral.workflows.options import flag
 

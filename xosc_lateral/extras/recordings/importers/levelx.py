@@ -29,10 +29,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, rate
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rates import rate
 from xosc_lateral.base.vehicle_classes import TRUCKS
 from xosc_lateral.drivers.drives.evidence import FASTEST_ASIDE
 from xosc_lateral.drivers.drives.identity import identify

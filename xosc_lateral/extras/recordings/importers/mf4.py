@@ -34,8 +34,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.limits import CLOCK_ROWS, TIME
 from xosc_lateral.base.segment import CONTEXT_UNITS
-from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP
-from xosc_lateral.drivers.drives.resampling import average, resample
+from xosc_lateral.drivers.drives.drive import LANE_JUMP_SHARE, MAX_GAP, average, resample
 from xosc_lateral.extras.recordings.cuts import KEPT_ROWS
 from xosc_lateral.extras.recordings.formula import FormulaError, evaluate
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer, paths_of

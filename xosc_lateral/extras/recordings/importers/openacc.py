@@ -28,10 +28,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from xosc_lateral.base.arrays import BoolArray, FloatArray
+from xosc_lateral.base.arrays import BoolArray, FloatArray, true_slices
 from xosc_lateral.base.errors import FormatError, NotEnoughDataError
-from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rows import true_slices
+from xosc_lateral.base.lazy import interpolate, pd, spatial
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.cleaning import RESOLUTION, RUN, VALID_BELOW
 from xosc_lateral.drivers.drives.identity import identify
@@ -166,11 +165,9 @@ class _Loop:
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Index along the points with its fraction, and distance to the left [m], as between two normals."""
-        from scipy.spatial import cKDTree
-
         normals, where = self.normals(), np.stack([x, y], axis=1)
         columns = self.points, normals, np.stack([normals[:, 1], -normals[:, 0]], axis=1)
-        index: FloatArray = np.asarray(cKDTree(self.points).query(where)[1], dtype=np.float64)
+        index: FloatArray = np.asarray(spatial.cKDTree(self.points).query(where)[1], dtype=np.float64)
         for _ in range(PLACING_STEPS):
             centre, _, tangent = _between_points(index, columns)
             index = index + np.einsum("ij,ij->i", where - centre, tangent) / GRID_STEP
@@ -232,10 +229,8 @@ def _closed(path: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _even(points: FloatArray) -> _Loop:
     """With points at even steps again: arc lengths by cubics, so that corners don't get between points."""
-    from scipy.interpolate import CubicSpline
-
     closed, way, even = _closed(points)
-    return _Loop(np.asarray(CubicSpline(way, closed, bc_type="periodic")(even)))
+    return _Loop(np.asarray(interpolate.CubicSpline(way, closed, bc_type="periodic")(even)))
 
 
 def _smooth(values: FloatArray) -> FloatArray:

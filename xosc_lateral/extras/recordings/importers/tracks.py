@@ -16,11 +16,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.base.arrays import FloatArray, IntArray
+from xosc_lateral.base.arrays import FloatArray, IntArray, blocks, rate
 from xosc_lateral.base.errors import FormatError
-from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.rates import rate
-from xosc_lateral.base.rows import blocks
+from xosc_lateral.base.lazy import pd, spatial
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.evidence import of_registration
@@ -291,10 +289,8 @@ class Strip(LaneShape):
     """A lane between lines in the direction of travel, shape (n, 3); the centre may lie anywhere between. [m]"""
 
     def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
-        from scipy.spatial import cKDTree
-
         super().__init__(_dense(centre), [left, right], END_TOLERANCE)
-        self._tree = cKDTree(self.centre[:, :2])
+        self._tree = spatial.cKDTree(self.centre[:, :2])
         self._left, self._right = self._edge(left), self._edge(right)
 
     def _edge(self, line: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -33,10 +33,9 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.files.openscenario.element import elements, local_name
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import TimedVertices
-from xosc_lateral.files.openscenario.write.draft import Draft
-from xosc_lateral.files.openscenario.write.losses import Losses, remove
+from xosc_lateral.files.openscenario.write.draft import Draft, Losses, remove
 from xosc_lateral.files.openscenario.write.moving import Moving, add_vertices, moving_entities, wrapped
-from xosc_lateral.files.openscenario.write.older import add_missing_overrides
+from xosc_lateral.files.openscenario.write.versions import add_missing_overrides
 from xosc_lateral.world.motion.nominal import Activity, NominalMotion
 from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, RowStretch, vertex_times
 from xosc_lateral.world.scenario.controllers import is_named_under_test

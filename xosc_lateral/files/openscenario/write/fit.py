@@ -14,9 +14,8 @@ from xosc_lateral.files.openscenario.provenance import mark, write_sealed
 from xosc_lateral.files.openscenario.read import is_town
 from xosc_lateral.files.openscenario.write.build import version_text
 from xosc_lateral.files.openscenario.write.carla import fit_carla
-from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Player, TargetPlayer, WrittenScenario
+from xosc_lateral.files.openscenario.write.draft import STANDARD, Draft, Losses, Player, TargetPlayer, WrittenScenario
 from xosc_lateral.files.openscenario.write.literal import fill_in, inline_catalogs
-from xosc_lateral.files.openscenario.write.losses import Losses
 from xosc_lateral.files.openscenario.write.reactive import LateralActions, add_paths
 from xosc_lateral.files.openscenario.write.replay import replay
 from xosc_lateral.files.openscenario.write.versions import fit_version

@@ -14,8 +14,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario.element import XmlElement, children_of, elements, local_name, parent_of
 from xosc_lateral.files.openscenario.references import NAMES, entry_scope, local_scope
-from xosc_lateral.files.openscenario.write.draft import Draft, unchanged
-from xosc_lateral.files.openscenario.write.losses import Losses
+from xosc_lateral.files.openscenario.write.draft import Draft, Losses, unchanged
 from xosc_lateral.world.scenario.parameters import ExpressionError, Scope
 from xosc_lateral.world.scenario.scenario import Scenario
 

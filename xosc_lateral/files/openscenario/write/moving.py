@@ -9,8 +9,7 @@ import numpy as np
 from lxml import etree
 from msgspec import structs
 
-from xosc_lateral.base.arrays import FloatArray
-from xosc_lateral.base.rows import blocks, columns
+from xosc_lateral.base.arrays import FloatArray, blocks, columns
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write import build
 from xosc_lateral.files.openscenario.write.build import ColumnsOf, Pose, TimedVertices

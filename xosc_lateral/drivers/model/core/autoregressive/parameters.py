@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import DriverProfileError
 from xosc_lateral.base.limits import MODEL_ORDER
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.drives.filters import filtered, low_pass
-from xosc_lateral.drivers.drives.resampling import STEP
 from xosc_lateral.drivers.model.core.base import NOISE_VARIANCE, CoreModel, ShapedNoise, Start
 from xosc_lateral.drivers.model.linear_filters import JitKernel, worth_compiling
 from xosc_lateral.drivers.model.records import Record, frozen_array, set_once

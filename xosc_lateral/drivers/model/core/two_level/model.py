@@ -26,7 +26,7 @@ from msgspec import Meta
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray
 from xosc_lateral.base.errors import DriverProfileError
-from xosc_lateral.drivers.drives.resampling import STEP
+from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.model.core.base import (
     KERNEL_TAPS,
     N_KNOTS,
