@@ -6,9 +6,8 @@ triggers and maneuvers, and lane offsets are added.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from math import inf
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Unpack
 
@@ -189,8 +188,13 @@ def sample(plan: Plan) -> Enriched:
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
-Look = tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]
-"""An output, read and its nominal run, and what differs from its source."""
+@dataclass(slots=True)
+class Look:
+    """An output, read, and its nominal run as soon as that was played."""
+
+    written: Written
+    scenario: Scenario
+    run: NominalMotion | None = None
 
 
 def _look_at_replay(written: Written) -> Written:
@@ -201,8 +205,8 @@ def _look_at_replay(written: Written) -> Written:
     return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in findings for one in some))
 
 
-def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
-    """Play a reactive output in `EventEquivalence`'s ways of driving, until `most` happens otherwise."""
+def _looked_at(plan: Plan, written: Written) -> tuple[Look, Iterator[Comparison]]:
+    """A reactive output, to be played in `EventEquivalence`'s ways of driving as far as somebody asks."""
     source = plan.played.scenario
     read_files = (path for path in (*source.input_files, source.road_file) if path is not None)
     allowed = (*plan.settings.allow, *(path.parent for path in read_files))
@@ -210,10 +214,15 @@ def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
     output = read_scenario(
         leads_from(plan.source, plan.output), allowed=allowed, roads=plan.settings.roads, data=written.file.data
     )
-    comparisons, run = plan.prepared.equivalence(tuple(plan.egos)).compare(
-        output, written.vehicles.trajectories, written.with_lane_offsets, most=most
-    )
-    return (written, output, run), comparisons
+    look = Look(written, output)
+
+    def runs() -> Iterator[Comparison]:
+        equivalence = plan.prepared.equivalence(tuple(plan.egos))
+        for comparison, run in equivalence.compare(output, written.vehicles.trajectories, written.with_lane_offsets):
+            look.run = run if comparison.run == NOMINAL_RUN else look.run
+            yield comparison
+
+    return look, runs()
 
 
 def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
@@ -224,10 +233,11 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
     def made(ways: Mapping[str, Way]) -> list[OffsetPath]:
         return [path for name in names for path in phases(name, ways.get(name))[0]]
 
-    def attempt(paths: Sequence[OffsetPath], most: float) -> Look:
-        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance), most)
+    def attempt(paths: Sequence[OffsetPath]) -> tuple[Look, Iterator[Comparison]]:
+        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance))
 
-    (best, output, run), kept = largest_equivalent(made, plan.played.motion, attempt)
+    look, kept = largest_equivalent(made, plan.played.motion, attempt)
+    best, output, run = look.written, look.scenario, look.run
     unmoved = vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
     movement = as_played(sampled, output, run, best.with_lane_offsets, unmoved)

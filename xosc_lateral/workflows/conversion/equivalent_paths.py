@@ -6,15 +6,19 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way
+from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, HOW_NEW, Change, Comparison, largest_of, later
 from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
+
+RUNS = (NOMINAL_RUN, *OTHER_RUNS)
+"""Of a scenario: how vehicles under test drive in them, in words."""
 
 CHANGES = "with offsets, what happens would happen otherwise"
 
@@ -107,20 +111,44 @@ class EquivalentPaths:
 
 
 Ways = dict[str, Way]
-Trial = tuple[Ways, Sizes]
+Driven = tuple[Ways, Sizes]
+"""How lane changes of some vehicles lead across, and of what size some paths are."""
+
+
+@dataclass(slots=True)
+class _Trial(Generic[Output]):
+    """An output that is tried, and those of its runs that were played so far, each compared with the source's own."""
+
+    driven: Driven
+    output: Output
+    runs: Iterator[Comparison]
+    comparisons: list[Comparison] = field(default_factory=list)
+
+    def changes(self, most: float = inf, within: Collection[str] = ()) -> list[Change]:
+        """What happens otherwise; not more runs than show `most` of it are played, nor than those `within`, if any."""
+        while len(found := changes_of(self.comparisons)) < most:
+            if within and {one.run for one in self.comparisons}.issuperset(within):
+                break
+            compared = next(self.runs, None)
+            if compared is None:
+                break
+            self.comparisons.append(compared)
+        return found
 
 
 def largest_equivalent(
     made: Callable[[Ways], Sequence[OffsetPath]],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetPath], float], tuple[Output, list[Comparison]]],
+    attempt: Callable[[Sequence[OffsetPath]], tuple[Output, Iterator[Comparison]]],
 ) -> tuple[Output, EquivalentPaths]:
     """The largest movement that leaves what happens as it was, as far as any of it does, and the output with it.
 
-    Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended.
+    Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended. How
+    much that is, is looked for in the runs in which something happened otherwise; what is kept was played in all.
 
     - `made`: paths where lane changes of some vehicles lead across otherwise than they should
-    - `attempt`: writes paths and plays, until as much happens otherwise as it is told
+    - `attempt`: writes paths; the output, and comparisons of its runs as they are asked for, those first that differed
+      in others
     """
 
     def applied(ways: Ways, sizes: Sizes) -> list[OffsetPath]:
@@ -131,38 +159,50 @@ def largest_equivalent(
             driven.append(resized(path, sizes[key]) if key in sizes else path)
         return [path for path in driven if path.pieces or path.settles]
 
-    kept: Trial = {}, {}
-    output, comparisons = attempt(applied(*kept), inf)
-    changes, trials, mended = changes_of(comparisons), 1, dict[str, Change]()
+    def tried(less: Driven) -> _Trial[Output]:
+        driven = kept[0] | less[0], kept[1] | less[1]
+        return _Trial(driven, *attempt(applied(*driven)))
+
+    kept: Driven = {}, {}
+    best, trials, mended = tried(kept), 1, dict[str, Change]()
+    changes = best.changes()
     names = dict.fromkeys(path.entity for path in made({}))
     for name in dict.fromkeys([*(one.entity for one in changes if one.entity in names), *names]):
         if not changes or trials >= MOST_TRIALS:
             break
-        fewest, before = len(changes), kept
-        for number, (ways, sizes) in enumerate(_smaller(name, changes, made, motion)):
-            trial = before[0] | ways, before[1] | sizes
-            tried, outcome = attempt(applied(*trial), fewest)
-            trials += 1
-            is_better = len(changes_of(outcome)) < fewest
-            if is_better:
-                kept, output, comparisons = trial, tried, outcome
-                left = {one.what for one in changes_of(outcome)}
-                mended.setdefault(name, next((one for one in changes if one.what not in left), changes[0]))
-            if is_better is (number > 0):  # not its fault; or all that it may move
-                break
-            fewest = len(changes_of(comparisons)) + 1
-        changes = changes_of(comparisons)
+        changed = {one.run for one in best.comparisons if one.changes}
+        nothing, *smaller = _smaller(name, changes, made, motion)
+        enough = [tried(nothing)]
+        left, trials = enough[0].changes(len(changes), changed), trials + 1
+        if len(left) >= len(changes):  # not its fault
+            continue
+        fewest, middle = len(left) + 1, 0
+        while smaller:  # the largest first, then in halves: what is smaller than one that is enough is, too
+            trial, trials = tried(smaller[middle]), trials + 1
+            if len(trial.changes(fewest, changed)) < fewest:
+                enough.append(trial)
+                smaller = smaller[:middle]
+            else:
+                smaller = smaller[middle + 1 :]
+            middle = len(smaller) // 2
+        enough_in_all = (one for one in enough[:0:-1] if len(one.changes(fewest)) < fewest)
+        trial = next(enough_in_all, enough[0])
+        if len(trial.changes(len(changes))) < len(changes):
+            whats = {one.what for one in left}
+            mended[name] = next((one for one in changes if one.what not in whats), changes[0])
+            best, kept = trial, trial.driven
+            changes = best.changes()
     least: dict[str, tuple[float, bool]] = {}
     for name in dict.fromkeys(name for name, _ in kept[1]):
         theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
         least[name] = min(theirs), max(theirs) < 1.0
-    paths = tuple(applied(*kept))
-    return output, EquivalentPaths(paths, tuple(comparisons), tuple(changes), least, kept[0], mended)
+    comparisons = tuple(sorted(best.comparisons, key=lambda one: RUNS.index(one.run)))
+    return best.output, EquivalentPaths(tuple(applied(*kept)), comparisons, tuple(changes), least, kept[0], mended)
 
 
 def _smaller(
     name: str, changes: Sequence[Change], made: Callable[[Ways], Sequence[OffsetPath]], motion: NominalMotion
-) -> Iterator[Trial]:
+) -> Iterator[Driven]:
     """Of one vehicle: nothing at all, then less and less of lane changes and of the path before the first change."""
 
     def begins(path: OffsetPath) -> float:
@@ -178,7 +218,7 @@ def _smaller(
         yield written, {}
     first = min((one.time for one in changes if one.entity == name), default=inf)
     nearest = min(range(len(starts)), key=lambda k: (starts[k] > first, -starts[k]), default=0)
-    for size in SIZES:
+    for size in SIZES if len(starts) > 1 else SIZES[:-1]:  # the only path at rest is nothing at all
         yield written, {(name, nearest): size}
 
 
