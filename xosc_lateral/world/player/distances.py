@@ -80,10 +80,10 @@ def straight_distance(state: EntityState, x: float, y: float) -> float:
     return length if ahead > 0.0 else -length
 
 
-def spot_of(state: EntityState) -> Spot:
-    """Where an entity is along the roads; x and y, which nobody needs then, are NaN."""
+def spot_of(state: EntityState, *, t: bool = True) -> Spot:
+    """Where an entity is along the roads; x and y, which nobody needs then, are NaN, as is its t unless asked for."""
     state.locate()
-    return Spot(nan, nan, state.road, state.lane, state.s, nan if state.road == NO_ROAD else state.t)
+    return Spot(nan, nan, state.road, state.lane, state.s, state.t if t and state.road != NO_ROAD else nan)
 
 
 def road_gap(state: EntityState, spot: Spot, *, limit: float = UNREACHABLE_DISTANCE) -> RoadGap | None:
@@ -179,7 +179,9 @@ class Measure(Struct, frozen=True, eq=False):
             if least > enough + MARGIN or most < near - MARGIN:
                 return least if least > enough else most
         if not self.freespace:
-            return self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(other.plane.x, other.plane.y))
+            is_lateral = self.kind is RelativeDistanceType.LATERAL
+            place = spot_of(other, t=is_lateral) if self.is_along_roads else Spot(other.plane.x, other.plane.y)
+            return self.to_spot(state, place)
         if not self.is_along_roads:
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
         if overlap(state, other):
@@ -234,8 +236,9 @@ class Measure(Struct, frozen=True, eq=False):
         if self.system is CoordinateSystem.ENTITY:
             ahead, left = ahead_and_left(state, spot.x, spot.y)
             return left if lateral else ahead
-        gap = road_gap(state, spot)
-        return None if gap is None else gap.dt if lateral else gap.ds
+        here = spot_of(state, t=lateral)
+        path = _path_between(state, here, spot)
+        return None if path is None else _across(here, spot, path) if lateral else path.ds
 
     def _between_boxes(self, state: EntityState, shape: tuple[Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""

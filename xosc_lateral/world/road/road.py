@@ -81,19 +81,22 @@ class Road:
         """Index of the lane section at s; beyond the ends the first or last one. `s` in [m]."""
         return max(bisect_right(self.section_starts, s) - 1, 0)
 
-    def reference_at(self, s: float) -> tuple[float, float, float]:
-        """x, y, heading of the reference line. [m], [rad]"""
+    def element_at(self, s: float) -> tuple[ReferenceElement, float]:
+        """The piece of the reference line at s, and how far along it that is. [m]"""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0
-        return self.elements[i].at(s - self.starts[i])
+        return self.elements[i], s - self.starts[i]
+
+    def reference_at(self, s: float) -> tuple[float, float, float]:
+        """x, y, heading of the reference line. [m], [rad]"""
+        element, along = self.element_at(s)
+        return element.at(along)
 
     def curvature_at(self, s: float) -> float:
         """Curvature of the reference line. [1/m]"""
-        i = bisect_right(self.starts, s) - 1
-        if i < 0:
-            i = 0
-        return self.elements[i].curvature_at(s - self.starts[i])
+        element, along = self.element_at(s)
+        return element.curvature_at(along)
 
     def stretch_of(self, lane: int, s: float) -> tuple[float, float, ReferenceElement, float, float]:
         """Range around s on one element of the reference line [m], that element, its start, and t of the lane. [m]
@@ -269,7 +272,8 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     low, high = -1.0, length + 1.0
     leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
     for _ in range(MOST_ITERATIONS):
-        line_x, line_y, heading = road.reference_at(s)
+        element, along = road.element_at(s)
+        line_x, line_y, heading = element.at(along)
         dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
         ahead, across = dx * c + dy * d, dy * c - dx * d
         if leans:
@@ -278,7 +282,7 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
             low = s
         if ahead <= 0.0:
             high = s
-        step = min(max(ahead / max(1.0 - road.curvature_at(s) * across, 0.2), -MAX_STEP), MAX_STEP)
+        step = min(max(ahead / max(1.0 - element.curvature_at(along) * across, 0.2), -MAX_STEP), MAX_STEP)
         moved = s + step
         if abs(step) > CONVERGED_STEP and (moved <= low or moved >= high):
             moved = 0.5 * (low + high)
