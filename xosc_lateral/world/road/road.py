@@ -67,11 +67,16 @@ class Road:
     is_motorway: bool = False  # on some of it at least (``road/type``)
     section_starts: tuple[float, ...] = field(init=False)
     is_flat: bool = field(init=False)
+    is_level: bool = field(init=False)  # it leans nowhere
+    leads: bool = field(init=False)  # it leans and climbs: what is beside it is further along, too
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
         heights = any(lane.heights for section in self.sections for lane in section.lanes)
-        object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
+        is_flat = self.surface.is_flat and not heights
+        leads = not self.surface.superelevation.is_zero and not self.surface.elevation.is_zero
+        for name, value in (("is_flat", is_flat), ("is_level", self.surface.is_level), ("leads", leads)):
+            object.__setattr__(self, name, value)
 
     def section_at(self, s: float) -> LaneSection:
         """The lane section at s; beyond the ends the first or last one. `s` in [m]."""
@@ -270,13 +275,12 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     length = road.length
     s = min(max(guess, 0.0), length)
     low, high = -1.0, length + 1.0
-    leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
     for _ in range(MOST_ITERATIONS):
         element, along = road.element_at(s)
         line_x, line_y, heading = element.at(along)
         dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
         ahead, across = dx * c + dy * d, dy * c - dx * d
-        if leans:
+        if road.leads:
             ahead -= road.surface.lead_at(s, across)
         if ahead >= 0.0:
             low = s
@@ -295,8 +299,8 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
     ahead = dx * c + dy * d
     t = dy * c - dx * d
-    if leans:
+    if road.leads:
         ahead -= road.surface.lead_at(s, t)
-    if not road.surface.is_level:
+    if not road.is_level:
         t /= cos(road.surface.superelevation.at(s))
     return s, t, 0.0 if abs(ahead) < 1e-9 else ahead
