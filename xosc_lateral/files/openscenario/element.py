@@ -32,10 +32,11 @@ def means_true(text: str) -> bool:
 class XmlElement:
     """An element of the scenario or of a catalog, in the scope that its attributes are read in."""
 
-    __slots__ = ("_node", "path", "scope", "xml")
+    __slots__ = ("node", "path", "scope", "xml")
 
     def __init__(self, xml: etree._Element, path: Path, scope: Scope, node: tuple[int, ...] | None = None) -> None:
-        self.xml, self.path, self.scope, self._node = xml, path, scope, node
+        self.xml, self.path, self.scope = xml, path, scope
+        self.node = node_of(xml) if node is None else node  # child indices from the root down to it, comments counted
 
     # --- tree ---------------------------------------------------------------------------------------------------
 
@@ -47,8 +48,7 @@ class XmlElement:
     def children(self, *tags: str) -> Iterator[XmlElement]:
         """Child elements, of these tags or all; comments left out."""
         for index, child in enumerate(self.xml):
-            tag = child.tag
-            if isinstance(tag, str) and (not tags or tag.rpartition("}")[2] in tags):
+            if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
                 # looked for among its neighbours, the last of many vertices would take as long as all of them
                 yield XmlElement(child, self.path, self.scope, (*self.node, index))
 
@@ -70,7 +70,7 @@ class XmlElement:
 
     def within(self, scope: Scope) -> XmlElement:
         """The same element in another scope."""
-        return XmlElement(self.xml, self.path, scope, self._node)
+        return XmlElement(self.xml, self.path, scope, self.node)
 
     # --- attributes ---------------------------------------------------------------------------------------------
 
@@ -151,13 +151,6 @@ class XmlElement:
     def place(self) -> Place:
         """File, line, element, and the way to find it again."""
         return Place(str(self.path), line_of(self.xml), self.label(), self.node)
-
-    @property
-    def node(self) -> tuple[int, ...]:
-        """Child indices from the root down to it, comments counted."""
-        if self._node is None:
-            self._node = node_of(self.xml)
-        return self._node
 
     def label(self) -> str:
         """``Event 'brake'``, or ``SpeedAction of Event 'brake'`` for an element without a name."""

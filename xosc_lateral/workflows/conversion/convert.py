@@ -6,8 +6,8 @@ triggers and maneuvers, and lane offsets are added.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
@@ -28,19 +28,17 @@ from xosc_lateral.workflows.conversion.across import Way, in_words
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.equivalent_paths import largest_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import Runs, largest_equivalent
 from xosc_lateral.workflows.conversion.event_equivalence import as_played
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, phases_of, provenance_of, write
 from xosc_lateral.workflows.inputs import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.look import compare_parts, worst_of
-from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.scenario import Scenario
 
@@ -188,15 +186,6 @@ def sample(plan: Plan) -> Enriched:
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
-@dataclass(slots=True)
-class Look:
-    """An output, read, and its nominal run as soon as that was played."""
-
-    written: Written
-    scenario: Scenario
-    run: NominalMotion | None = None
-
-
 def _look_at_replay(written: Written) -> Written:
     """A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made."""
     findings = (
@@ -205,8 +194,8 @@ def _look_at_replay(written: Written) -> Written:
     return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in findings for one in some))
 
 
-def _looked_at(plan: Plan, written: Written) -> tuple[Look, Iterator[Comparison]]:
-    """A reactive output, to be played in `EventEquivalence`'s ways of driving as far as somebody asks."""
+def _looked_at(plan: Plan, written: Written, first: Collection[str]) -> tuple[tuple[Written, Scenario], Runs]:
+    """A reactive output, read, and its runs in `EventEquivalence`'s ways of driving as they are asked for."""
     source = plan.played.scenario
     read_files = (path for path in (*source.input_files, source.road_file) if path is not None)
     allowed = (*plan.settings.allow, *(path.parent for path in read_files))
@@ -214,15 +203,10 @@ def _looked_at(plan: Plan, written: Written) -> tuple[Look, Iterator[Comparison]
     output = read_scenario(
         leads_from(plan.source, plan.output), allowed=allowed, roads=plan.settings.roads, data=written.file.data
     )
-    look = Look(written, output)
-
-    def runs() -> Iterator[Comparison]:
-        equivalence = plan.prepared.equivalence(tuple(plan.egos))
-        for comparison, run in equivalence.compare(output, written.vehicles.trajectories, written.with_lane_offsets):
-            look.run = run if comparison.run == NOMINAL_RUN else look.run
-            yield comparison
-
-    return look, runs()
+    runs = plan.prepared.equivalence(tuple(plan.egos)).compare(
+        output, written.vehicles.trajectories, written.with_lane_offsets, first=first
+    )
+    return (written, output), runs
 
 
 def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
@@ -233,11 +217,10 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
     def made(ways: Mapping[str, Way]) -> list[OffsetPath]:
         return [path for name in names for path in phases(name, ways.get(name))[0]]
 
-    def attempt(paths: Sequence[OffsetPath]) -> tuple[Look, Iterator[Comparison]]:
-        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance))
+    def attempt(paths: Sequence[OffsetPath], first: Collection[str]) -> tuple[tuple[Written, Scenario], Runs]:
+        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance), first)
 
-    look, kept = largest_equivalent(made, plan.played.motion, attempt)
-    best, output, run = look.written, look.scenario, look.run
+    (best, output), run, kept = largest_equivalent(made, plan.played.motion, attempt)
     unmoved = vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
     movement = as_played(sampled, output, run, best.with_lane_offsets, unmoved)

@@ -17,7 +17,7 @@ from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
 
-RUNS = (NOMINAL_RUN, *OTHER_RUNS)
+RUN_NAMES = (NOMINAL_RUN, *OTHER_RUNS)
 """Of a scenario: how vehicles under test drive in them, in words."""
 
 CHANGES = "with offsets, what happens would happen otherwise"
@@ -113,43 +113,47 @@ class EquivalentPaths:
 Ways = dict[str, Way]
 Driven = tuple[Ways, Sizes]
 """How lane changes of some vehicles lead across, and of what size some paths are."""
+Runs = Iterator[tuple[Comparison, NominalMotion]]
+"""Of an output, each compared with the source's own."""
 
 
 @dataclass(slots=True)
 class _Trial(Generic[Output]):
-    """An output that is tried, and those of its runs that were played so far, each compared with the source's own."""
+    """An output that is tried, and what came of those of its runs that were played so far."""
 
     driven: Driven
     output: Output
-    runs: Iterator[Comparison]
+    runs: Runs
     comparisons: list[Comparison] = field(default_factory=list)
+    nominal: NominalMotion | None = None  # its nominal run, if that was played
 
-    def changes(self, most: float = inf, within: Collection[str] = ()) -> list[Change]:
-        """What happens otherwise; not more runs than show `most` of it are played, nor than those `within`, if any."""
-        while len(found := changes_of(self.comparisons)) < most:
-            if within and {one.run for one in self.comparisons}.issuperset(within):
-                break
-            compared = next(self.runs, None)
-            if compared is None:
-                break
-            self.comparisons.append(compared)
+    def changes(self, most: float = inf, runs: float = inf) -> list[Change]:
+        """What happens otherwise: in all runs, or in as many as show `most` of it, or in so many."""
+        found = changes_of(self.comparisons)
+        while len(found) < most and len(self.comparisons) < runs and (played := next(self.runs, None)):
+            comparison, run = played
+            self.comparisons.append(comparison)
+            self.nominal = run if comparison.run == NOMINAL_RUN else self.nominal
+            found = changes_of(self.comparisons)
         return found
 
 
 def largest_equivalent(
     made: Callable[[Ways], Sequence[OffsetPath]],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetPath]], tuple[Output, Iterator[Comparison]]],
-) -> tuple[Output, EquivalentPaths]:
-    """The largest movement that leaves what happens as it was, as far as any of it does, and the output with it.
+    attempt: Callable[[Sequence[OffsetPath], Collection[str]], tuple[Output, Runs]],
+) -> tuple[Output, NominalMotion | None, EquivalentPaths]:
+    """The largest movement that leaves what happens as it was, as far as any of it does; its output and nominal run.
 
     Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended. How
     much that is, is looked for in the runs in which something happened otherwise; what is kept was played in all.
 
     - `made`: paths where lane changes of some vehicles lead across otherwise than they should
-    - `attempt`: writes paths; the output, and comparisons of its runs as they are asked for, those first that differed
-      in others
+    - `attempt`: writes paths; the output, and its runs as they are asked for, some of them first
     """
+
+    trials, changed, mended = 0, list[str](), dict[str, Change]()
+    kept: Driven = {}, {}
 
     def applied(ways: Ways, sizes: Sizes) -> list[OffsetPath]:
         numbers, driven = Counter[str](), list[OffsetPath]()
@@ -159,45 +163,43 @@ def largest_equivalent(
             driven.append(resized(path, sizes[key]) if key in sizes else path)
         return [path for path in driven if path.pieces or path.settles]
 
-    def tried(less: Driven) -> _Trial[Output]:
-        driven = kept[0] | less[0], kept[1] | less[1]
-        return _Trial(driven, *attempt(applied(*driven)))
+    def tried(ways: Ways, sizes: Sizes) -> _Trial[Output]:
+        nonlocal trials
+        trials += 1
+        driven = kept[0] | ways, kept[1] | sizes
+        return _Trial(driven, *attempt(applied(*driven), changed))
 
-    kept: Driven = {}, {}
-    best, trials, mended = tried(kept), 1, dict[str, Change]()
+    best = tried({}, {})
     changes = best.changes()
     names = dict.fromkeys(path.entity for path in made({}))
     for name in dict.fromkeys([*(one.entity for one in changes if one.entity in names), *names]):
         if not changes or trials >= MOST_TRIALS:
             break
-        changed = {one.run for one in best.comparisons if one.changes}
+        changed = [one.run for one in best.comparisons if one.changes]
         nothing, *smaller = _smaller(name, changes, made, motion)
-        enough = [tried(nothing)]
-        left, trials = enough[0].changes(len(changes), changed), trials + 1
+        enough = tried(*nothing)
+        left = {one.what for one in enough.changes(len(changes), len(changed))}
         if len(left) >= len(changes):  # not its fault
             continue
-        fewest, middle = len(left) + 1, 0
-        while smaller:  # the largest first, then in halves: what is smaller than one that is enough is, too
-            trial, trials = tried(smaller[middle]), trials + 1
-            if len(trial.changes(fewest, changed)) < fewest:
-                enough.append(trial)
-                smaller = smaller[:middle]
+        at = 0
+        while smaller:  # the largest first, then in halves: who has to move less does not move more
+            trial = tried(*smaller[at])
+            if len(trial.changes(len(left) + 1)) <= len(left):
+                enough, smaller = trial, smaller[:at]
             else:
-                smaller = smaller[middle + 1 :]
-            middle = len(smaller) // 2
-        enough_in_all = (one for one in enough[:0:-1] if len(one.changes(fewest)) < fewest)
-        trial = next(enough_in_all, enough[0])
-        if len(trial.changes(len(changes))) < len(changes):
-            whats = {one.what for one in left}
-            mended[name] = next((one for one in changes if one.what not in whats), changes[0])
-            best, kept = trial, trial.driven
+                smaller = smaller[at + 1 :]
+            at = len(smaller) // 2
+        if len(enough.changes(len(changes))) < len(changes):
+            mended[name] = next((one for one in changes if one.what not in left), changes[0])
+            best, kept = enough, enough.driven
             changes = best.changes()
     least: dict[str, tuple[float, bool]] = {}
     for name in dict.fromkeys(name for name, _ in kept[1]):
         theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
         least[name] = min(theirs), max(theirs) < 1.0
-    comparisons = tuple(sorted(best.comparisons, key=lambda one: RUNS.index(one.run)))
-    return best.output, EquivalentPaths(tuple(applied(*kept)), comparisons, tuple(changes), least, kept[0], mended)
+    comparisons = tuple(sorted(best.comparisons, key=lambda one: RUN_NAMES.index(one.run)))
+    paths = EquivalentPaths(tuple(applied(*kept)), comparisons, tuple(changes), least, kept[0], mended)
+    return best.output, best.nominal, paths
 
 
 def _smaller(

@@ -6,7 +6,6 @@ take longer or shorter from beside the middle explain (`shifts`). Otherwise move
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from math import inf
@@ -19,7 +18,7 @@ from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
 from xosc_lateral.workflows.conversion.ego_drives import drives, with_speeds
-from xosc_lateral.workflows.conversion.equivalent_paths import CHANGES, RUNS
+from xosc_lateral.workflows.conversion.equivalent_paths import CHANGES, RUN_NAMES, Runs
 from xosc_lateral.workflows.conversion.load import Played
 from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, nominal_result
 from xosc_lateral.workflows.conversion.shifts import (
@@ -79,13 +78,12 @@ class EventEquivalence:
             self._before.append(self._run(played.scenario, k))
         # an output's runs: not those in which an ego changes nothing for anybody
         self._order = [k for k in range(len(self._drives)) if not any(self._alike(k, j) for j in range(k))]
-        self._differed = Counter[int]()
-        self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
+        self._chance: dict[tuple[int, frozenset[str]], dict[str, float]] = {}
 
     @property
     def runs(self) -> Iterator[tuple[str, NominalMotion]]:
         """Of the source: how vehicles under test drive, and what is played then."""
-        return zip(RUNS, (motion for _, motion in self._before), strict=False)
+        return zip(RUN_NAMES, (motion for _, motion in self._before), strict=False)
 
     @property
     def end(self) -> float:
@@ -125,15 +123,15 @@ class EventEquivalence:
         )
 
     def compare(
-        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str]
-    ) -> Iterator[tuple[Comparison, NominalMotion]]:
+        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, first: Collection[str] = ()
+    ) -> Runs:
         """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
 
-        Each run with its own, played when it is asked for; first those in which outputs differed before.
+        Each run with its own, played when it is asked for, some of them first.
         """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
-        for k in sorted(self._order, key=lambda k: -self._differed[k]):
-            name, (driven, before), (_, run) = RUNS[k], self._before[k], self._run(scenario, k)
+        for k in sorted(self._order, key=lambda k: RUN_NAMES[k] not in first):
+            name, (driven, before), (_, run) = RUN_NAMES[k], self._before[k], self._run(scenario, k)
             kept, still = (
                 replace(motion, actions=tuple(
                     one for one in motion.actions if one.path[:3] not in gone and one.actor not in trajectories
@@ -144,8 +142,7 @@ class EventEquivalence:
             comparison = compare_runs(driven, network, kept, still, ignored=trajectories, ends=ends)
             by_chance: tuple[Change, ...] = ()
             if comparison.changes:
-                key = name, frozenset(trajectories)
-                if key not in self._chance:  # of the source alone: the same for all that is tried
+                if (key := (k, frozenset(trajectories))) not in self._chance:  # the same for all that is tried
                     self._chance[key] = self._by_chance(driven, kept, trajectories)
                 hangs = [abs(one.size) <= self._chance[key].get(one.about, 0.0) for one in comparison.changes]
                 by_chance, others = (
@@ -166,7 +163,6 @@ class EventEquivalence:
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
             remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning), *rests)
-            self._differed[k] += len(changes)
             yield Comparison(shifts, changes, remarks, by_chance, name), run
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:

@@ -252,11 +252,7 @@ def lane_at(
 
 def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
     """The speed limit of (s, limit) records at s; inf where there is none. [m/s]"""
-    limit = inf
-    for start, value in speeds:
-        if start <= s:
-            limit = value
-    return limit
+    return next((value for start, value in reversed(speeds) if start <= s), inf)
 
 
 # ---- from x, y to s, t: the foot of the perpendicular on the reference line ----
