@@ -37,8 +37,8 @@ def neighbour_columns(
     )  # fmt: skip
     on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
     on_right[graph.left[on_left]] = True
-    columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
-    begin, n = 0, len(by_time)
+    by_time, parts = np.argsort(instant, kind="stable"), int(part.max()) + 1
+    columns, begin, n = dict[str, FloatArray | BoolArray](), 0, len(by_time)
     while begin < n:  # as many instants at a time as have some rows
         last = instant[by_time[min(begin + BLOCK, n) - 1]]
         end = int(np.searchsorted(instant, last, side="right", sorter=by_time))
@@ -49,9 +49,10 @@ def neighbour_columns(
             lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
         )  # fmt: skip
         for name, values in near.items():
-            columns.setdefault(name, np.empty(n))[rows] = values
+            # an eighth of the memory where it will do, as long as all else is here
+            columns.setdefault(name, np.empty(n, np.bool_ if name.endswith("is_truck") else np.float64))[rows] = values
     del row_of, instant, middle, by_time
-    return {name: columns.pop(name)[place] for name in list(columns)}
+    return {name: columns.pop(name)[place].astype(np.float64, copy=False) for name in list(columns)}
 
 
 def find_neighbours(

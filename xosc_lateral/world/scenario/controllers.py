@@ -325,8 +325,6 @@ def _mark(entity: Entity, controllers: Iterable[Controller]) -> str:
 
 def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
     for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            yield (private.entity_ref,), action
+        yield from (((private.entity_ref,), action) for action in private.actions)
     for at in scenario.storyboard.events():
-        for action in at.event.actions:
-            yield at.actors, action
+        yield from ((at.actors, action) for action in at.event.actions)
