@@ -100,8 +100,7 @@ def name_states(
         of, at = run[rows], time[rows]
         code[rows][kept[rows] & ((at - begin[of] < edge[of]) | (end[of] - at < edge[of]))] = len(reasons) + 1
         code[rows][kept[rows] & is_short[of]] = len(reasons) + 2
-    names = pd.Index([KEPT_ROWS, *reasons, "edge", "short"])
-    return pd.Categorical.from_codes(code, categories=names)
+    return pd.Categorical.from_codes(code, categories=pd.Index([KEPT_ROWS, *reasons, "edge", "short"]))
 
 
 def number_runs(state: pd.Categorical[str], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:

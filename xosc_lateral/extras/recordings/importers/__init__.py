@@ -293,8 +293,7 @@ def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
         wrong = kept & implausible_rows(name, values, believed)
         if name in _POSITIONS or name == "time":
             wrong |= kept & np.isnan(values)
-        allowed = 0.0 if name == "time" else MAX_OUTSIDE
-        if wrong.sum() > allowed * kept.sum():
+        if wrong.sum() > (0.0 if name == "time" else MAX_OUTSIDE) * kept.sum():
             value, share = values[int(np.argmax(wrong))], 100 * wrong.sum() / kept.sum()
             what = f"{value:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
             raise FormatError(f"{what}, {share:.0f} % of the rows", path=path, element=f"column {name!r}")
