@@ -129,13 +129,13 @@ class _Trial(Generic[Output]):
 
     def changes(self, most: float = inf, runs: float = inf) -> list[Change]:
         """What happens otherwise: in all runs, or in as many as show `most` of it, or in so many."""
-        found = changes_of(self.comparisons)
-        while len(found) < most and len(self.comparisons) < runs and (played := next(self.runs, None)):
+        changes = changes_of(self.comparisons)
+        while len(changes) < most and len(self.comparisons) < runs and (played := next(self.runs, None)):
             comparison, run = played
             self.comparisons.append(comparison)
             self.nominal = run if comparison.run == NOMINAL_RUN else self.nominal
-            found = changes_of(self.comparisons)
-        return found
+            changes = changes_of(self.comparisons)
+        return changes
 
 
 def largest_equivalent(
@@ -197,7 +197,7 @@ def largest_equivalent(
     for name in dict.fromkeys(name for name, _ in kept[1]):
         theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
         least[name] = min(theirs), max(theirs) < 1.0
-    comparisons = tuple(sorted(best.comparisons, key=lambda one: RUN_NAMES.index(one.run)))
+    comparisons = tuple(sorted(best.comparisons, key=lambda compared: RUN_NAMES.index(compared.run)))
     paths = EquivalentPaths(tuple(applied(*kept)), comparisons, tuple(changes), least, kept[0], mended)
     return best.output, best.nominal, paths
 
