@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from lxml import etree
 
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.note import Note
-from xosc_lateral.files.openscenario.element import XmlElement
+from xosc_lateral.files.openscenario.element import XmlElement, at_node
 from xosc_lateral.files.openscenario.references import (
     broken_constraint,
     declared_values,
@@ -157,3 +158,17 @@ def test_a_declared_value_beyond_its_constraints_plays_and_is_remarked_an_overri
     notes.clear()
     read_declarations(root, {"v": "40"}, notes)
     assert notes == []
+
+
+def test_an_element_knows_its_place_in_the_tree() -> None:
+    root = etree.fromstring("<a><!-- a comment --><b/><c><d/><?pi?><d><e/></d></c></a>")
+
+    def below(element: XmlElement) -> Iterator[XmlElement]:
+        yield element
+        for child in element.children():
+            yield from below(child)
+
+    found = [*below(XmlElement(root, Path("made.xosc"), Scope({})))]
+    assert [one.tag for one in found] == ["a", "b", "c", "d", "d", "e"]
+    assert found[-1].node == (2, 2, 0) and found[-1].within(Scope({})).node == (2, 2, 0)
+    assert all(at_node(root, one.node) is one.xml for one in found)

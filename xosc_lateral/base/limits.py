@@ -155,8 +155,10 @@ def limits_table() -> str:
     lines = ["| limit | at most | why |", "|---|---|---|"]
     lines += [f"| {item.what} | {item} | {item.reason} |" for item in globals().values() if isinstance(item, Limit)]
     lines += ["", "| context | from | to | why |", "|---|---|---|---|"]
-    for name, item in (*CONTEXT_RANGES.items(), ("any other", ANY_CONTEXT)):
-        lines.append(f"| {name} | {item.low:g} | {item.high:g} | {item.reason} |")
+    lines += [
+        f"| {name} | {item.low:g} | {item.high:g} | {item.reason} |"
+        for name, item in (*CONTEXT_RANGES.items(), ("any other", ANY_CONTEXT))
+    ]
     return "\n".join(lines)
 
 

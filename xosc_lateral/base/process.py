@@ -44,10 +44,8 @@ def free_bytes() -> float:
 
 
 def _of_machine() -> float:
-    for line in _lines("/proc/meminfo"):
-        if line.startswith("MemAvailable:"):
-            return 1024.0 * int(line.split()[1])
-    return float("inf")
+    available = (line.split()[1] for line in _lines("/proc/meminfo") if line.startswith("MemAvailable:"))
+    return 1024.0 * float(next(available, "inf"))
 
 
 def _of_container() -> float:

@@ -80,6 +80,5 @@ def glob(folder: Path, pattern: str) -> Iterator[Path]:
         yield from folder.glob(pattern)
         return
     levels = pattern.count("/") + 1
-    for path in held.files:
-        if folder in path.parents and len(path.relative_to(folder).parts) == levels and path.match(pattern):
-            yield path
+    below = (path for path in held.files if folder in path.parents)
+    yield from (path for path in below if len(path.relative_to(folder).parts) == levels and path.match(pattern))

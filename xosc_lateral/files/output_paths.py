@@ -134,10 +134,8 @@ def is_own(path: Path) -> bool:
     if path.stat().st_size == 0:
         return True
     name = path.name.lower()
-    for suffix, check in _CHECKS.items():
-        if name.endswith(suffix):
-            return check(path)
-    return _own_table(path)
+    check = next((check for suffix, check in _CHECKS.items() if name.endswith(suffix)), _own_table)
+    return check(path)
 
 
 def template_mark(text: str, begin: str = "<!-- ", end: str = " -->") -> str:

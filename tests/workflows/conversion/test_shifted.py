@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +23,9 @@ from tests.kit.stage import (
     when,
 )
 from xosc_lateral.workflows.conversion.across import Way
-from xosc_lateral.workflows.conversion.equivalent_paths import Ways, largest_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import RUN_NAMES, Runs, Ways, largest_equivalent
 from xosc_lateral.workflows.conversion.load import Played
+from xosc_lateral.workflows.conversion.result import NOMINAL_RUN
 from xosc_lateral.workflows.conversion.shifts import Change, Comparison, compare_runs
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, PathPiece, resized
@@ -60,6 +61,14 @@ def test_an_event_that_is_missing_is_named(tmp_path: Path) -> None:
     assert str(change.note) == "event 'then' of 'Ego' at 3.00 s no longer happens with the offsets"
 
 
+AS_BEFORE = Comparison((), (), run=NOMINAL_RUN)
+
+
+def _without_event(entity: str) -> Comparison:
+    change = Change(f"event 'cut in' of '{entity}' at 8.00 s", entity, 8.0, "no longer happens")
+    return Comparison((), (change,), run=NOMINAL_RUN)
+
+
 def _path(entity: str, after: tuple[str, ...] | None) -> OffsetPath:
     piece = PathPiece(np.array([0.0, 50.0, 100.0]), np.array([0.0, 0.1, -0.1]))
     return OffsetPath(entity, after, (piece,))
@@ -75,14 +84,16 @@ def _largest(path: OffsetPath) -> float:
 
 def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
     """Planted: what A does before its maneuver changes an event if it is larger than a third of what was sampled."""
-    change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
+    change = Comparison(
+        (), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),), run=NOMINAL_RUN
+    )
     paths = [_path("A", None), _path("A", ("late",)), _path("B", None)]
 
-    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
+    def attempt(some: Sequence[OffsetPath], _: object) -> tuple[None, Runs]:
         large = [one for one in some if one.entity == "A" and one.after is None and _largest(one) > 0.034]
-        return None, [change if large else Comparison((), ())]
+        return None, iter([(change if large else AS_BEFORE, _nobody())])
 
-    _, kept = largest_equivalent(lambda _: paths, _nobody(), attempt)
+    *_, kept = largest_equivalent(lambda _: paths, _nobody(), attempt)
     assert kept.changes == ()
     assert [_largest(path) for path in kept.paths] == [pytest.approx(0.025), 0.1, 0.1]
     assert kept.smaller == {"A": (0.25, False)}
@@ -91,7 +102,9 @@ def test_the_smallest_change_that_helps_is_one_path_of_one_vehicle() -> None:
 
 def test_lane_changes_lead_across_as_far_as_that_changes_nothing() -> None:
     """Planted: drivers' way of A's lane change costs an event, the written one that ends aside does not."""
-    change = Comparison((), (Change("event 'cut in' of 'B' at 8.00 s", "B", 8.0, "no longer happens"),))
+    change = Comparison(
+        (), (Change("event 'cut in' of 'B' at 8.00 s", "B", 8.0, "no longer happens"),), run=NOMINAL_RUN
+    )
     tried = list[list[tuple[str, Way]]]()
 
     def made(ways: Ways) -> list[OffsetPath]:
@@ -99,20 +112,45 @@ def test_lane_changes_lead_across_as_far_as_that_changes_nothing() -> None:
         tried.append([*ways.items()])
         return [_path("A", None), *led, _path("B", None)]
 
-    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
+    def attempt(some: Sequence[OffsetPath], _: object) -> tuple[None, Runs]:
         leads = any(one.instead and one.entity == "A" for one in some) and ("A", Way.ASIDE) not in tried[-1]
-        return None, [change if leads else Comparison((), ())]
+        return None, iter([(change if leads else AS_BEFORE, _nobody())])
 
-    _, kept = largest_equivalent(made, _nobody(), attempt)
+    *_, kept = largest_equivalent(made, _nobody(), attempt)
     assert kept.changes == () and kept.smaller == {} and kept.ways == {"A": Way.ASIDE}
     assert not any(name == "C" for ways in tried for name, _ in ways)
     assert "end where its driver is then" in next(kept.warnings(())).what
 
 
+def test_less_is_looked_for_where_something_differed_and_is_kept_if_it_changes_nothing_elsewhere() -> None:
+    """Planted: all that A moves costs an event in one run; a quarter mends it, and half of it does, but costs another
+    event in another run."""
+    paths, played = [_path("A", None), _path("A", ("late",))], list[tuple[float, str]]()
+
+    def attempt(some: Sequence[OffsetPath], first: Collection[str]) -> tuple[float, Runs]:
+        size = max((_largest(path) / 0.1 for path in some if path.after is None), default=0.0)
+
+        def runs() -> Iterator[tuple[Comparison, NominalMotion]]:
+            for run in sorted(RUN_NAMES[:3], key=lambda run: run not in first):
+                played.append((size, run))
+                lost = (size > 0.6) if run == RUN_NAMES[2] else (0.3 < size < 0.6 and run == RUN_NAMES[1])
+                yield replace(_without_event("A") if lost else AS_BEFORE, run=run), _nobody()
+
+        return size, runs()
+
+    size, nominal, kept = largest_equivalent(lambda _: paths, _nobody(), attempt)
+    assert size == pytest.approx(0.25) and nominal is not None and kept.changes == ()
+    assert [one.run for one in kept.comparisons] == [*RUN_NAMES[:3]], "what is kept was played in all runs, in order"
+    assert [run for size, run in played if size == 0.0][:1] == [RUN_NAMES[2]]
+    assert (0.0, NOMINAL_RUN) not in played[:5], "whether its staying mends something shows where something differed"
+
+
 def test_what_no_change_of_offsets_helps_against_is_told_and_costs_nobody_offsets() -> None:
-    change = Comparison((), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),))
+    change = Comparison(
+        (), (Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens"),), run=NOMINAL_RUN
+    )
     paths = [_path("A", None), _path("B", None)]
-    _, kept = largest_equivalent(lambda _: paths, _nobody(), lambda *_: (None, [change]))
+    *_, kept = largest_equivalent(lambda _: paths, _nobody(), lambda *_: (None, iter([(change, _nobody())])))
     assert kept.paths == tuple(paths) and kept.smaller == {}
     assert kept.changes == change.changes
 
@@ -128,10 +166,10 @@ def test_nobody_moves_farther_than_was_sampled_whatever_is_tried() -> None:
     ]
     tried: list[OffsetPath] = []
 
-    def attempt(some: Sequence[OffsetPath], _: float) -> tuple[None, list[Comparison]]:
+    def attempt(some: Sequence[OffsetPath], _: object) -> tuple[None, Runs]:
         tried.extend(some)
-        change = Change("event 'cut in' of 'A' at 8.00 s", "A", 8.0, "no longer happens")
-        return None, [Comparison((), (change,) if any(path.entity == "A" for path in some) else ())]
+        moves = any(path.entity == "A" for path in some)
+        return None, iter([(_without_event("A") if moves else AS_BEFORE, _nobody())])
 
     largest_equivalent(lambda _: paths, _nobody(), attempt)
     assert len({path.start for path in tried}) == 4

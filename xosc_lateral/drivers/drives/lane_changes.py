@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -118,8 +118,7 @@ class Course:
             rough.append(self._change(0, settled[0].start, settled[0].start, cut=True))
         else:
             rough += self._open(settled[0], 0)
-        for part in settled:
-            rough += self._given_up(part)
+        rough += chain.from_iterable(map(self._given_up, settled))
         for part, next_part in pairwise(settled):
             if lanes[part.start] == lanes[next_part.start]:
                 rough += self._excursion(float(self.base[part.start]), part.stop, next_part.start)

@@ -339,7 +339,7 @@ def alarms_per_hour(paths: Sequence[FloatArray], step: float, speed: float) -> f
     rows, count, seconds = round(ALARM_HOLD / step), 0, 0.0
     for path in paths:
         moves = np.diff(path) / step
-        for fast in (moves > speed, moves < -speed):
-            count += sum(part.stop - part.start >= rows for part in true_slices(fast))
+        fast = (part for faster in (moves > speed, moves < -speed) for part in true_slices(faster))
+        count += sum(part.stop - part.start >= rows for part in fast)
         seconds += len(moves) * step
     return 3600.0 * count / seconds if seconds else 0.0

@@ -7,19 +7,15 @@ through x and y, of its heading as recorded and of its lane have to agree, else 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IntArray, blocks
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.lane_changes import MAXIMUM_HALF_DURATION, SETTLED_OFFSET, Course
 from xosc_lateral.files.mapping import COMPASS
@@ -60,7 +56,7 @@ def lane_changes(
     where unknown; rows sorted by vehicle and time; `clock`: their times, or the step between them. [s]
     """
     changing = np.zeros(len(x), dtype=np.bool_)
-    side = np.full(len(x), settings.open_offset)
+    side = np.broadcast_to(settings.open_offset, len(x))
     edges = np.flatnonzero(np.diff(vehicle, prepend=vehicle[:1] - 1, append=vehicle[-1:] + 1))
     for rows in (slice(*edge) for edge in pairwise(edges.tolist())):
         y, base = x[rows], x[rows] - offset[rows]
@@ -94,14 +90,16 @@ def name_states(
         code[cut] = k
     kept = code == 0
     run = _kept_runs(kept, lane, vehicle, time)
-    first = np.flatnonzero(np.diff(run, prepend=-1))
+    first = np.flatnonzero(np.r_[True, run[1:] != run[:-1]][: len(run)])
     begin, end = time[first], time[np.r_[first[1:], len(run)][: len(first)] - 1]
     row_seconds = (end - begin) / np.maximum(np.bincount(run) - 1, 1)  # a row stands for its step
-    edge = settings.edge - 0.5 * row_seconds[run]
-    code[kept & ((time - begin[run] < edge) | (end[run] - time < edge))] = len(reasons) + 1
-    code[kept & (end - begin + row_seconds - 2 * settings.edge < settings.shortest - 1e-6)[run]] = len(reasons) + 2
-    names = pd.Index([KEPT_ROWS, *reasons, "edge", "short"])
-    return pd.Categorical.from_codes(code, categories=names)
+    edge = settings.edge - 0.5 * row_seconds
+    is_short = end - begin + row_seconds - 2 * settings.edge < settings.shortest - 1e-6
+    for rows in blocks(len(run)):
+        of, at = run[rows], time[rows]
+        code[rows][kept[rows] & ((at - begin[of] < edge[of]) | (end[of] - at < edge[of]))] = len(reasons) + 1
+        code[rows][kept[rows] & is_short[of]] = len(reasons) + 2
+    return pd.Categorical.from_codes(code, categories=pd.Index([KEPT_ROWS, *reasons, "edge", "short"]))
 
 
 def number_runs(state: pd.Categorical[str], lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
@@ -109,45 +107,22 @@ def number_runs(state: pd.Categorical[str], lane: IntArray, vehicle: IntArray, t
     kept = np.asarray(state == KEPT_ROWS)
     run = _kept_runs(kept, lane, vehicle, time)
     begins = kept & np.r_[True, (run[1:] != run[:-1])]
+    del run
     counted = np.cumsum(begins)
-    start = np.searchsorted(vehicle, vehicle, side="left")
-    return np.where(kept, counted - 1 - (counted - begins)[start], -1)
-
-
-def cut_table(
-    columns: Mapping[str, Any],
-    settings: CutSettings,
-    *,
-    vehicle: IntArray,
-    time: FloatArray,
-    lane: IntArray,
-    step: float,
-    sideways: FloatArray,
-    reasons: Mapping[str, BoolArray],
-    kind: NDArray[Any],
-    is_truck: BoolArray,
-) -> pd.DataFrame:
-    """The drive table: these columns, classes of vehicles, numbers of kept stretches, and `state`.
-
-    Rows sorted by vehicle and time, usually a step apart [s], shape (n,); `lane`: a number that changes with it.
-    `sideways`: lateral position, continuous through lane changes. [m] `reasons`: for cuts besides lane changes.
-    """
-    changing = lane_changes(sideways, columns["offset"], lane, vehicle, time, settings)
-    state = name_states({**reasons, "lane change": changing}, lane, vehicle, time, step, settings)
-    runs = number_runs(state, lane, vehicle, time)
-    words = pd.concat([pd.Series(kind[part], dtype=str) for part in blocks(len(kind))], ignore_index=True)
-    more = {"vehicle_class": words.array, "is_truck": is_truck.astype(np.float64), RUN: runs, "state": state}
-    return pd.DataFrame({**columns, **more}, copy=False)
+    edges = np.flatnonzero(np.r_[True, vehicle[1:] != vehicle[:-1], True])
+    counted -= np.repeat((counted - begins)[edges[:-1]] + 1, np.diff(edges))
+    counted[~kept] = -1
+    return counted
 
 
 def _kept_runs(kept: BoolArray, lane: IntArray, vehicle: IntArray, time: FloatArray) -> IntArray:
     """Number of each row's stretch of equal fate, in one lane and without a gap that `fit` would not bridge."""
     other = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1])
-    return _runs(other | (np.diff(time) > MAX_GAP + 1e-9))
+    return _runs(other | (time[1:] - time[:-1] > MAX_GAP + 1e-9))
 
 
 def _runs(new: BoolArray) -> IntArray:
-    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
+    return np.cumsum(np.r_[False, new], dtype=np.int64)
 
 
 MOVING_SPEED = 3.0  # slower vehicles have no direction: 2 cm of noise in 0.4 s turn the way at 3 m/s by 1 degree [m/s]

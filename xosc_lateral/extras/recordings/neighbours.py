@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BLOCK, BoolArray, FloatArray, IntArray
 from xosc_lateral.base.track import MAX_GAP
@@ -29,15 +30,15 @@ def neighbour_columns(
     """
     inside, piece = piece >= 0, np.maximum(piece, 0)
     part, middle, rank, own_scale = graph.stations(piece, middle)
-    scale = own_scale * scale
+    own_scale *= scale
     rank = np.where(inside, rank - int(rank.min()), -1)
     row_of, instant, middle, place = at_instants(
-        middle, np.where(inside, part, -1), speed / scale, time, vehicle, step
+        middle, np.where(inside, part, -1), speed / own_scale, time, vehicle, step
     )  # fmt: skip
     on_left, on_right = graph.left >= 0, np.zeros(len(graph.left), dtype=np.bool_)
     on_right[graph.left[on_left]] = True
-    columns, by_time, parts = dict[str, FloatArray](), np.argsort(instant, kind="stable"), int(part.max()) + 1
-    begin, n = 0, len(by_time)
+    by_time, parts = np.argsort(instant, kind="stable").astype(np.int32), int(part.max()) + 1
+    columns, begin, n = dict[str, FloatArray | BoolArray](), 0, len(by_time)
     while begin < n:  # as many instants at a time as have some rows
         last = instant[by_time[min(begin + BLOCK, n) - 1]]
         end = int(np.searchsorted(instant, last, side="right", sorter=by_time))
@@ -45,12 +46,13 @@ def neighbour_columns(
         row, begin = row_of[rows], end
         near = find_neighbours(
             instant[rows] * parts + part[row], rank[row], middle[rows], length[row], is_truck[row],
-            lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=scale[row],
+            lane_on_left=on_left[piece[row]], lane_on_right=on_right[piece[row]], scale=own_scale[row],
         )  # fmt: skip
         for name, values in near.items():
-            columns.setdefault(name, np.empty(n))[rows] = values
+            # an eighth of the memory where it will do, as long as all else is here
+            columns.setdefault(name, np.empty(n, np.bool_ if name.endswith("is_truck") else np.float64))[rows] = values
     del row_of, instant, middle, by_time
-    return {name: columns.pop(name)[place] for name in list(columns)}
+    return {name: columns.pop(name)[place].astype(np.float64, copy=False) for name in list(columns)}
 
 
 def find_neighbours(
@@ -102,7 +104,8 @@ FIRST_STEPS = 100  # a common clock is fitted to so many steps first, then to tw
 
 def instants(time: FloatArray, vehicle: IntArray, step: float) -> tuple[IntArray, FloatArray]:
     """Number of each row's instant, counted up from 0, and its time, shape (n,); `step`: median of a vehicle. [s]"""
-    stamps, at = np.unique(time, return_inverse=True)
+    stamps = np.unique(time)
+    at = np.searchsorted(stamps, time)
     new = np.r_[True, np.diff(stamps) > STAMP_DISTANCE * step]
     number = np.cumsum(new) - 1
     first = stamps[new]
@@ -133,7 +136,7 @@ def _clock(time: FloatArray, vehicle: IntArray, step: float) -> tuple[float, flo
 
 def at_instants(
     along: FloatArray, part: IntArray, speed: FloatArray, time: FloatArray, vehicle: IntArray, step: float
-) -> tuple[IntArray, IntArray, FloatArray, IntArray]:
+) -> tuple[NDArray[np.int32], IntArray, FloatArray, NDArray[np.int32]]:
     """Every vehicle at every instant from its first to its last, those too that it misses for at most `MAX_GAP`.
 
     Row of the recording, or the last one before; number of the instant; way along the road there: between two rows of
@@ -158,4 +161,5 @@ def at_instants(
     moved = along[row] + speed[row] * (when[row] - time[row])
     del when
     instant = np.r_[instant[row], filled]  # no longer of every row
-    return np.r_[row, last], instant, np.r_[moved, way], np.cumsum(new) - 1
+    # rows as numbers of half the usual size
+    return np.r_[row, last].astype(np.int32), instant, np.r_[moved, way], np.cumsum(new, dtype=np.int32) - 1

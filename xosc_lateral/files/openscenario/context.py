@@ -98,11 +98,9 @@ def read_struct(kind: type[S], e: XmlElement, context: Context, /, **preset: Any
     Raises `FormatError` for an attribute or a child element that is missing and has no default, or is not of its type,
     and for what the struct itself refuses.
     """
-    for name, reader in _readers(kind):
-        if name not in preset:
-            preset[name] = reader(e, context)
+    read = {name: reader(e, context) for name, reader in _readers(kind) if name not in preset}
     try:
-        return kind(**preset)
+        return kind(**preset, **read)
     except ValueError as error:
         e.fail(str(error))
 

@@ -59,8 +59,7 @@ class LogicalScenario:
             yield from filter(self._accepts, self.distribution)
             return
         rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
-        for _ in range(self.distribution.number_of_test_runs):
-            yield self._draw(self.distribution, rng)
+        yield from (self._draw(self.distribution, rng) for _ in range(self.distribution.number_of_test_runs))
 
     @property
     def count(self) -> int:

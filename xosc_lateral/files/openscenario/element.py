@@ -32,10 +32,11 @@ def means_true(text: str) -> bool:
 class XmlElement:
     """An element of the scenario or of a catalog, in the scope that its attributes are read in."""
 
-    __slots__ = ("path", "scope", "xml")
+    __slots__ = ("node", "path", "scope", "xml")
 
-    def __init__(self, xml: etree._Element, path: Path, scope: Scope) -> None:
+    def __init__(self, xml: etree._Element, path: Path, scope: Scope, node: tuple[int, ...] | None = None) -> None:
         self.xml, self.path, self.scope = xml, path, scope
+        self.node = node_of(xml) if node is None else node  # child indices from the root down to it, comments counted
 
     # --- tree ---------------------------------------------------------------------------------------------------
 
@@ -46,9 +47,10 @@ class XmlElement:
 
     def children(self, *tags: str) -> Iterator[XmlElement]:
         """Child elements, of these tags or all; comments left out."""
-        for child in self.xml:
+        for index, child in enumerate(self.xml):
             if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
-                yield XmlElement(child, self.path, self.scope)
+                # looked for among its neighbours, the last of many vertices would take as long as all of them
+                yield XmlElement(child, self.path, self.scope, (*self.node, index))
 
     def listed(self, holder: str, tag: str) -> Iterator[XmlElement]:
         """Elements of one tag in a child that holds them; none without it."""
@@ -68,7 +70,7 @@ class XmlElement:
 
     def within(self, scope: Scope) -> XmlElement:
         """The same element in another scope."""
-        return XmlElement(self.xml, self.path, scope)
+        return XmlElement(self.xml, self.path, scope, self.node)
 
     # --- attributes ---------------------------------------------------------------------------------------------
 
@@ -148,7 +150,7 @@ class XmlElement:
 
     def place(self) -> Place:
         """File, line, element, and the way to find it again."""
-        return Place(str(self.path), line_of(self.xml), self.label(), node_of(self.xml))
+        return Place(str(self.path), line_of(self.xml), self.label(), self.node)
 
     def label(self) -> str:
         """``Event 'brake'``, or ``SpeedAction of Event 'brake'`` for an element without a name."""

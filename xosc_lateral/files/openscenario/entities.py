@@ -77,9 +77,7 @@ CATEGORIES = {
 def read_entities(root: XmlElement, context: Context) -> tuple[Entity, ...]:
     """All entities in file order, each trailer described inside its tractor after it; names go into the context."""
     owner = root.required("Entities")
-    entities: list[Entity] = []
-    for item in owner.children("ScenarioObject"):
-        entities.extend(_read_object(item, context))
+    entities = [entity for item in owner.children("ScenarioObject") for entity in _read_object(item, context)]
     for entity in entities:
         if entity.name in context.entities:
             owner.fail(f"two entities are called '{entity.name}'")

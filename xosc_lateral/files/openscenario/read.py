@@ -36,7 +36,8 @@ BOOLEANS = frozenset(
 def note_spellings(root: XmlElement) -> list[Note]:
     """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
     elements: dict[tuple[str, str], list[etree._Element]] = {}
-    for item in root.xml.iter("{*}*"):
+    asked = BOOLEANS | {"parameterType"}
+    for item in (one for one in root.xml.iter("{*}*") if not asked.isdisjoint(one.keys())):
         declares = item.get("parameterType") == "boolean"
         for name, value in item.attrib.items():
             word = str(value).strip()

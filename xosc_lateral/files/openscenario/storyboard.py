@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -67,10 +69,8 @@ def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]
 
 
 def _contents(owner: XmlElement) -> list[XmlElement]:
-    elements: list[XmlElement] = []
-    for child in owner.children():
-        elements.extend(_contents(child) if child.tag in GROUPING else [child])
-    return elements
+    parts = (_contents(child) if child.tag in GROUPING else [child] for child in owner.children())
+    return [*chain.from_iterable(parts)]
 
 
 def _entity(e: XmlElement, context: Context) -> Struct:
@@ -206,13 +206,13 @@ def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
 
 
 def _read_event(element: XmlElement, context: Context) -> Event:
-    actions = []
+    actions = list[Action]()
     for item in element.children("Action"):
         contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))
         if not contents and item.child() is not None:
             item.fail("contains no PrivateAction, GlobalAction or UserDefinedAction")
-        for content in contents:
-            actions.extend(read_actions(content, item.text("name", ""), context))
+        parts = (read_actions(content, item.text("name", ""), context) for content in contents)
+        actions += chain.from_iterable(parts)
     return read_struct(Event, element, context, actions=tuple(actions))
 
 

@@ -6,9 +6,8 @@ triggers and maneuvers, and lane offsets are added.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from pathlib import Path
 from typing import Unpack
 
@@ -29,19 +28,17 @@ from xosc_lateral.workflows.conversion.across import Way, in_words
 from xosc_lateral.workflows.conversion.consequences import stay_as_written, validity_warnings
 from xosc_lateral.workflows.conversion.conversion import Conversion
 from xosc_lateral.workflows.conversion.enrich import enrich, seed_words_of
-from xosc_lateral.workflows.conversion.equivalent_paths import largest_equivalent
+from xosc_lateral.workflows.conversion.equivalent_paths import Runs, largest_equivalent
 from xosc_lateral.workflows.conversion.event_equivalence import as_played
 from xosc_lateral.workflows.conversion.plan import Plan, WrittenAs, decide, other_egos, respects_controllers
 from xosc_lateral.workflows.conversion.prepared import prepare
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Drivers, Enriched, LaneChanges
 from xosc_lateral.workflows.conversion.settings import ConvertKeywords, ConvertSettings
-from xosc_lateral.workflows.conversion.shifts import Comparison
 from xosc_lateral.workflows.conversion.write import Written, phases_of, provenance_of, write
 from xosc_lateral.workflows.opened import DocumentLike, scenario_input
 from xosc_lateral.workflows.options import spelled_out
 from xosc_lateral.workflows.result import PAGE_SUFFIXES, PathLike
 from xosc_lateral.world.motion.look import compare_parts, worst_of
-from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath
 from xosc_lateral.world.scenario.scenario import Scenario
 
@@ -189,10 +186,6 @@ def sample(plan: Plan) -> Enriched:
         raise DriverProfileError(f"{plan.source}: {error}") from error
 
 
-Look = tuple[tuple[Written, Scenario, NominalMotion | None], list[Comparison]]
-"""An output, read and its nominal run, and what differs from its source."""
-
-
 def _look_at_replay(written: Written) -> Written:
     """A replay follows the clock: nothing can happen otherwise, and its paths are looked at as they were made."""
     findings = (
@@ -201,8 +194,8 @@ def _look_at_replay(written: Written) -> Written:
     return replace(written, warnings=tuple(one.note(NOMINAL_RUN) for some in findings for one in some))
 
 
-def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
-    """Play a reactive output in `EventEquivalence`'s ways of driving, until `most` happens otherwise."""
+def _looked_at(plan: Plan, written: Written, first: Collection[str]) -> tuple[tuple[Written, Scenario], Runs]:
+    """A reactive output, read, and its runs in `EventEquivalence`'s ways of driving as they are asked for."""
     source = plan.played.scenario
     read_files = (path for path in (*source.input_files, source.road_file) if path is not None)
     allowed = (*plan.settings.allow, *(path.parent for path in read_files))
@@ -210,10 +203,10 @@ def _looked_at(plan: Plan, written: Written, most: float = inf) -> Look:
     output = read_scenario(
         leads_from(plan.source, plan.output), allowed=allowed, roads=plan.settings.roads, data=written.file.data
     )
-    comparisons, run = plan.prepared.equivalence(tuple(plan.egos)).compare(
-        output, written.vehicles.trajectories, written.with_lane_offsets, most=most
+    runs = plan.prepared.equivalence(tuple(plan.egos)).compare(
+        output, written.vehicles.trajectories, written.with_lane_offsets, first=first
     )
-    return (written, output, run), comparisons
+    return (written, output), runs
 
 
 def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) -> Written:
@@ -224,10 +217,10 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
     def made(ways: Mapping[str, Way]) -> list[OffsetPath]:
         return [path for name in names for path in phases(name, ways.get(name))[0]]
 
-    def attempt(paths: Sequence[OffsetPath], most: float) -> Look:
-        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance), most)
+    def attempt(paths: Sequence[OffsetPath], first: Collection[str]) -> tuple[tuple[Written, Scenario], Runs]:
+        return _looked_at(plan, write(paths, plan, sampled, vehicles, provenance), first)
 
-    (best, output, run), kept = largest_equivalent(made, plan.played.motion, attempt)
+    (best, output), run, kept = largest_equivalent(made, plan.played.motion, attempt)
     unmoved = vehicles.lane_offsets - best.with_lane_offsets
     assert run is not None  # what is taken was played in all runs
     movement = as_played(sampled, output, run, best.with_lane_offsets, unmoved)

@@ -188,9 +188,7 @@ def mirrored(segment: Segment) -> Segment:
 def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Context columns with left and right exchanged; one whose name has neither word stays."""
     columns = {other_side(name): values for name, values in context.items()}
-    for name in OTHER_SIGN:
-        if name in columns:
-            columns[name] = -columns[name]
+    columns |= {name: -columns[name] for name in OTHER_SIGN if name in columns}
     if "wind_direction" in columns:
         columns["wind_direction"] = -columns["wind_direction"] % 360.0
     if "lane_index" in columns and "lane_count" in columns:

@@ -6,15 +6,19 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way
+from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, HOW_NEW, Change, Comparison, largest_of, later
 from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
+
+RUN_NAMES = (NOMINAL_RUN, *OTHER_RUNS)
+"""Of a scenario: how vehicles under test drive in them, in words."""
 
 CHANGES = "with offsets, what happens would happen otherwise"
 
@@ -107,21 +111,49 @@ class EquivalentPaths:
 
 
 Ways = dict[str, Way]
-Trial = tuple[Ways, Sizes]
+Driven = tuple[Ways, Sizes]
+"""How lane changes of some vehicles lead across, and of what size some paths are."""
+Runs = Iterator[tuple[Comparison, NominalMotion]]
+"""Of an output, each compared with the source's own."""
+
+
+@dataclass(slots=True)
+class _Trial(Generic[Output]):
+    """An output that is tried, and what came of those of its runs that were played so far."""
+
+    driven: Driven
+    output: Output
+    runs: Runs
+    comparisons: list[Comparison] = field(default_factory=list)
+    nominal: NominalMotion | None = None  # its nominal run, if that was played
+
+    def changes(self, most: float = inf, runs: float = inf) -> list[Change]:
+        """What happens otherwise: in all runs, or in as many as show `most` of it, or in so many."""
+        changes = changes_of(self.comparisons)
+        while len(changes) < most and len(self.comparisons) < runs and (played := next(self.runs, None)):
+            comparison, run = played
+            self.comparisons.append(comparison)
+            self.nominal = run if comparison.run == NOMINAL_RUN else self.nominal
+            changes = changes_of(self.comparisons)
+        return changes
 
 
 def largest_equivalent(
     made: Callable[[Ways], Sequence[OffsetPath]],
     motion: NominalMotion,
-    attempt: Callable[[Sequence[OffsetPath], float], tuple[Output, list[Comparison]]],
-) -> tuple[Output, EquivalentPaths]:
-    """The largest movement that leaves what happens as it was, as far as any of it does, and the output with it.
+    attempt: Callable[[Sequence[OffsetPath], Collection[str]], tuple[Output, Runs]],
+) -> tuple[Output, NominalMotion | None, EquivalentPaths]:
+    """The largest movement that leaves what happens as it was, as far as any of it does; its output and nominal run.
 
-    Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended.
+    Vehicle by vehicle: whose staying as written mends something is to blame, and moves as much as leaves it mended. How
+    much that is, is looked for in the runs in which something happened otherwise; what is kept was played in all.
 
     - `made`: paths where lane changes of some vehicles lead across otherwise than they should
-    - `attempt`: writes paths and plays, until as much happens otherwise as it is told
+    - `attempt`: writes paths; the output, and its runs as they are asked for, some of them first
     """
+
+    trials, changed, mended = 0, list[str](), dict[str, Change]()
+    kept: Driven = {}, {}
 
     def applied(ways: Ways, sizes: Sizes) -> list[OffsetPath]:
         numbers, driven = Counter[str](), list[OffsetPath]()
@@ -131,38 +163,48 @@ def largest_equivalent(
             driven.append(resized(path, sizes[key]) if key in sizes else path)
         return [path for path in driven if path.pieces or path.settles]
 
-    kept: Trial = {}, {}
-    output, comparisons = attempt(applied(*kept), inf)
-    changes, trials, mended = changes_of(comparisons), 1, dict[str, Change]()
+    def tried(ways: Ways, sizes: Sizes) -> _Trial[Output]:
+        nonlocal trials
+        trials += 1
+        driven = kept[0] | ways, kept[1] | sizes
+        return _Trial(driven, *attempt(applied(*driven), changed))
+
+    best = tried({}, {})
+    changes = best.changes()
     names = dict.fromkeys(path.entity for path in made({}))
     for name in dict.fromkeys([*(one.entity for one in changes if one.entity in names), *names]):
         if not changes or trials >= MOST_TRIALS:
             break
-        fewest, before = len(changes), kept
-        for number, (ways, sizes) in enumerate(_smaller(name, changes, made, motion)):
-            trial = before[0] | ways, before[1] | sizes
-            tried, outcome = attempt(applied(*trial), fewest)
-            trials += 1
-            is_better = len(changes_of(outcome)) < fewest
-            if is_better:
-                kept, output, comparisons = trial, tried, outcome
-                left = {one.what for one in changes_of(outcome)}
-                mended.setdefault(name, next((one for one in changes if one.what not in left), changes[0]))
-            if is_better is (number > 0):  # not its fault; or all that it may move
-                break
-            fewest = len(changes_of(comparisons)) + 1
-        changes = changes_of(comparisons)
+        changed = [one.run for one in best.comparisons if one.changes]
+        nothing, *smaller = _smaller(name, changes, made, motion)
+        enough = tried(*nothing)
+        left = {one.what for one in enough.changes(len(changes), len(changed))}
+        if len(left) >= len(changes):  # not its fault
+            continue
+        at = 0
+        while smaller:  # the largest first, then in halves: who has to move less does not move more
+            trial = tried(*smaller[at])
+            if len(trial.changes(len(left) + 1)) <= len(left):
+                enough, smaller = trial, smaller[:at]
+            else:
+                smaller = smaller[at + 1 :]
+            at = len(smaller) // 2
+        if len(enough.changes(len(changes))) < len(changes):
+            mended[name] = next((one for one in changes if one.what not in left), changes[0])
+            best, kept = enough, enough.driven
+            changes = best.changes()
     least: dict[str, tuple[float, bool]] = {}
     for name in dict.fromkeys(name for name, _ in kept[1]):
         theirs = [kept[1].get((name, k), 1.0) for k in range(sum(path.entity == name for path in made(kept[0])))]
         least[name] = min(theirs), max(theirs) < 1.0
-    paths = tuple(applied(*kept))
-    return output, EquivalentPaths(paths, tuple(comparisons), tuple(changes), least, kept[0], mended)
+    comparisons = tuple(sorted(best.comparisons, key=lambda compared: RUN_NAMES.index(compared.run)))
+    paths = EquivalentPaths(tuple(applied(*kept)), comparisons, tuple(changes), least, kept[0], mended)
+    return best.output, best.nominal, paths
 
 
 def _smaller(
     name: str, changes: Sequence[Change], made: Callable[[Ways], Sequence[OffsetPath]], motion: NominalMotion
-) -> Iterator[Trial]:
+) -> Iterator[Driven]:
     """Of one vehicle: nothing at all, then less and less of lane changes and of the path before the first change."""
 
     def begins(path: OffsetPath) -> float:
@@ -178,7 +220,7 @@ def _smaller(
         yield written, {}
     first = min((one.time for one in changes if one.entity == name), default=inf)
     nearest = min(range(len(starts)), key=lambda k: (starts[k] > first, -starts[k]), default=0)
-    for size in SIZES:
+    for size in SIZES if len(starts) > 1 else SIZES[:-1]:  # the only path at rest is nothing at all
         yield written, {(name, nearest): size}
 
 

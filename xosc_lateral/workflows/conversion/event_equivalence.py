@@ -17,10 +17,10 @@ from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.track import Track
 from xosc_lateral.files.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.workflows.conversion.consequences import lane_departures
-from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS, drives, with_speeds
-from xosc_lateral.workflows.conversion.equivalent_paths import CHANGES, changes_of
+from xosc_lateral.workflows.conversion.ego_drives import drives, with_speeds
+from xosc_lateral.workflows.conversion.equivalent_paths import CHANGES, RUN_NAMES, Runs
 from xosc_lateral.workflows.conversion.load import Played
-from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, Enriched, EntityResult, nominal_result
+from xosc_lateral.workflows.conversion.result import Enriched, EntityResult, nominal_result
 from xosc_lateral.workflows.conversion.shifts import (
     EVENT_TOLERANCE,
     Change,
@@ -72,14 +72,14 @@ class EventEquivalence:
         self._before: list[tuple[Scenario, NominalMotion]] = []
         for k in range(len(self._drives)):
             self._before.append(self._run(played.scenario, k))
-        # in which an output's runs are played: not those in which an ego changes nothing for anybody
+        # an output's runs: not those in which an ego changes nothing for anybody
         self._order = [k for k in range(len(self._drives)) if not any(self._alike(k, j) for j in range(k))]
-        self._chance: dict[tuple[str, frozenset[str]], dict[str, float]] = {}
+        self._chance: dict[tuple[int, frozenset[str]], dict[str, float]] = {}
 
     @property
     def runs(self) -> Iterator[tuple[str, NominalMotion]]:
         """Of the source: how vehicles under test drive, and what is played then."""
-        return zip((NOMINAL_RUN, *OTHER_RUNS), (motion for _, motion in self._before), strict=False)
+        return zip(RUN_NAMES, (motion for _, motion in self._before), strict=False)
 
     @property
     def end(self) -> float:
@@ -119,18 +119,15 @@ class EventEquivalence:
         )
 
     def compare(
-        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, most: float = inf
-    ) -> tuple[list[Comparison], NominalMotion | None]:
+        self, scenario: Scenario, trajectories: Collection[str], moved: Collection[str], *, first: Collection[str] = ()
+    ) -> Runs:
         """With an output in which some entities follow trajectories and others are moved beside their maneuvers.
 
-        Each run with its own, as long as they differ in less than `most`; and the nominal run of the output, if it was
-        played. What differed last is looked at first.
+        Each run with its own, played when it is asked for, some of them first.
         """
         network, gone = self._played.network, {one.path for one in replaced_groups(self._played.scenario, trajectories)}
-        comparisons, nominal_run = dict[int, Comparison](), None
-        for k in self._order:
-            name, (driven, before), (_, run) = (NOMINAL_RUN, *OTHER_RUNS)[k], self._before[k], self._run(scenario, k)
-            nominal_run = run if k == 0 else nominal_run
+        for k in sorted(self._order, key=lambda k: RUN_NAMES[k] not in first):
+            name, (driven, before), (_, run) = RUN_NAMES[k], self._before[k], self._run(scenario, k)
             kept, still = (
                 replace(motion, actions=tuple(
                     one for one in motion.actions if one.path[:3] not in gone and one.actor not in trajectories
@@ -141,8 +138,7 @@ class EventEquivalence:
             comparison = compare_runs(driven, network, kept, still, ignored=trajectories, ends=ends)
             by_chance: tuple[Change, ...] = ()
             if comparison.changes:
-                key = name, frozenset(trajectories)
-                if key not in self._chance:  # of the source alone: the same for all that is tried
+                if (key := (k, frozenset(trajectories))) not in self._chance:  # the same for all that is tried
                     self._chance[key] = self._by_chance(driven, kept, trajectories)
                 hangs = [abs(one.size) <= self._chance[key].get(one.about, 0.0) for one in comparison.changes]
                 by_chance, others = (
@@ -163,11 +159,7 @@ class EventEquivalence:
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
             remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning), *rests)
-            comparisons[k] = Comparison(shifts, changes, remarks, by_chance, name)
-            if len(changes_of(comparisons.values())) >= most:
-                break
-        self._order.sort(key=lambda k: -len(comparisons[k].changes) if k in comparisons else 0)
-        return [comparisons[k] for k in sorted(comparisons)], nominal_run
+            yield Comparison(shifts, changes, remarks, by_chance, name), run
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:
         """What a source itself does otherwise, and by how much, in other frames: two things that meet in one. [s]"""

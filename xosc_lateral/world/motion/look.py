@@ -91,8 +91,7 @@ def look_at(
             findings += compare_tracks(source, entity, shifted)
         else:
             findings = [*_elsewhere(_Both(source, entity), shifted, AS_WRITTEN)]
-        for finding in findings:
-            yield structs.replace(finding, cause=_cause(before, finding))
+        yield from (structs.replace(finding, cause=_cause(before, finding)) for finding in findings)
 
 
 def compare_parts(source: Track, other: Track) -> Iterator[Finding]:

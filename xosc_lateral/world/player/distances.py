@@ -31,6 +31,9 @@ _ALONG_ROADS = (CoordinateSystem.ROAD, CoordinateSystem.LANE)
 MARGIN = 1e-3
 """Beyond what would be enough: more than what a comparison tolerates, of times too, up to 300 m/s. [m]"""
 
+MOST_STRETCH = 2.0
+"""A way beside a reference line is taken for no longer than so many times the way along it. [-]"""
+
 UNREACHABLE_DISTANCE = 1e10
 """Distance where there is no way from one to the other. [m]"""
 
@@ -77,10 +80,10 @@ def straight_distance(state: EntityState, x: float, y: float) -> float:
     return length if ahead > 0.0 else -length
 
 
-def spot_of(state: EntityState) -> Spot:
-    """Where an entity is along the roads; x and y, which nobody needs then, are NaN."""
+def spot_of(state: EntityState, *, t: bool = True) -> Spot:
+    """Where an entity is along the roads; x and y, which nobody needs then, are NaN, as is its t unless asked for."""
     state.locate()
-    return Spot(nan, nan, state.road, state.lane, state.s, nan if state.road == NO_ROAD else state.t)
+    return Spot(nan, nan, state.road, state.lane, state.s, state.t if t and state.road != NO_ROAD else nan)
 
 
 def road_gap(state: EntityState, spot: Spot, *, limit: float = UNREACHABLE_DISTANCE) -> RoadGap | None:
@@ -172,21 +175,23 @@ class Measure(Struct, frozen=True, eq=False):
     ) -> float | None:
         """From one entity to another, exact from `near` to `enough`. [m]"""
         if enough < inf and self.is_along_roads and self.kind is RelativeDistanceType.LONGITUDINAL:
-            least, most = self._bounds(state, other)
+            least, most = self._bounds(state, other, enough, near)
             if least > enough + MARGIN or most < near - MARGIN:
                 return least if least > enough else most
         if not self.freespace:
-            return self.to_spot(state, spot_of(other) if self.is_along_roads else Spot(other.plane.x, other.plane.y))
+            is_lateral = self.kind is RelativeDistanceType.LATERAL
+            place = spot_of(other, t=is_lateral) if self.is_along_roads else Spot(other.plane.x, other.plane.y)
+            return self.to_spot(state, place)
         if not self.is_along_roads:
             return self._between_boxes(state, corners(other), lambda: overlap(state, other))
         if overlap(state, other):
             return 0.0
         return self._between_corners(state, [_project(state, x, y) for x, y in corners(other)], other.name)
 
-    def _bounds(self, state: EntityState, other: EntityState) -> tuple[float, float]:
-        """How far away it is at least and at most, ahead or behind: by where both are, and from one's place on its road
-        to the other's, which are beside their boxes. No road bends so much that a way is half as long along its
-        reference line.
+    def _bounds(self, state: EntityState, other: EntityState, enough: float, near: float) -> tuple[float, float]:
+        """How far away it is at least and at most, ahead or behind, as closely as `to_entity` needs it: by where both
+        are, and from one's place on its road to the other's, which are beside their boxes. No road bends so much that a
+        way is half as long along its reference line.
         """
         sizes = _reach(state) + _reach(other) if self.freespace else 0.0
         least, most = 0.5 * apart(state, other.plane.x, other.plane.y) - sizes, inf
@@ -196,12 +201,16 @@ class Measure(Struct, frozen=True, eq=False):
         is_on_roads, ends = NO_ROAD not in (state.road, other.road), ((state.road, state.s), (other.road, other.s))
         path = state.network.path_between(*ends) if is_on_roads else None
         if path is not None and rooms > 0.0:
-            stretch = max(1.0 / max(1.0 - abs(_bend(one)), 0.5) for one in (state, other))
             # a reference point may be beside its own box
             boxes = (one.entity.bounding_box for one in (state, other))
-            beside = (max(abs(box.center_x) - 0.5 * box.length, abs(box.center_y) - 0.5 * box.width) for box in boxes)
-            most = abs(path.ds) + 2.0 * stretch * sum(max(gap, 0.0) for gap in beside)
-            least = max(least, abs(path.ds) - stretch * sizes)
+            beside = sum(
+                max(abs(box.center_x) - 0.5 * box.length, abs(box.center_y) - 0.5 * box.width, 0.0) for box in boxes
+            )
+            away, stretch = abs(path.ds), MOST_STRETCH
+            if beside > 0.0 or near - MARGIN <= away <= enough + MARGIN + stretch * sizes:  # bends decide
+                stretch = max(1.0 / max(1.0 - abs(_bend(one)), 1.0 / MOST_STRETCH) for one in (state, other))
+            most = away + 2.0 * stretch * beside
+            least = max(least, away - stretch * sizes)
         elif path is None and is_on_roads:
             what = f"no way leads along the roads to '{other.name}'; in esmini, one to where its box is nearest"
             self.note(what, state)
@@ -227,8 +236,9 @@ class Measure(Struct, frozen=True, eq=False):
         if self.system is CoordinateSystem.ENTITY:
             ahead, left = ahead_and_left(state, spot.x, spot.y)
             return left if lateral else ahead
-        gap = road_gap(state, spot)
-        return None if gap is None else gap.dt if lateral else gap.ds
+        here = spot_of(state, t=lateral)
+        path = _path_between(state, here, spot)
+        return None if path is None else _across(here, spot, path) if lateral else path.ds
 
     def _between_boxes(self, state: EntityState, shape: tuple[Point, ...], touches: Callable[[], bool]) -> float:
         """Gap from an entity's box to a shape, straight or along the axes of the world or of the entity. [m]"""

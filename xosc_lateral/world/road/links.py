@@ -104,11 +104,12 @@ class Links:
         if link is None:
             return
         # Direct junctions have no connecting roads whose own links lead back: their connections hold both ways.
-        for connection, other, contact in self._direct_connections(here, link, way):
-            yield other, contact, tuple((target, source) for source, target in connection.lanes), False
+        yield from (
+            (other, contact, tuple((target, source) for source, target in connection.lanes), False)
+            for connection, other, contact in self._direct_connections(here, link, way)
+        )
         # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
-        for other, contact in self._roads_back(here, link.element_id, way):
-            yield other, contact, (), True
+        yield from ((other, contact, (), True) for other, contact in self._roads_back(here, link.element_id, way))
 
     def beyond_end(
         self, road: int, section: int, lane: int, way: int, t: float, lane_types: Collection[str]

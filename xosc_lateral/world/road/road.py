@@ -67,11 +67,16 @@ class Road:
     is_motorway: bool = False  # on some of it at least (``road/type``)
     section_starts: tuple[float, ...] = field(init=False)
     is_flat: bool = field(init=False)
+    is_level: bool = field(init=False)  # it leans nowhere
+    leads: bool = field(init=False)  # it leans and climbs: what is beside it is further along, too
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
         heights = any(lane.heights for section in self.sections for lane in section.lanes)
-        object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
+        is_flat = self.surface.is_flat and not heights
+        leads = not self.surface.superelevation.is_zero and not self.surface.elevation.is_zero
+        for name, value in (("is_flat", is_flat), ("is_level", self.surface.is_level), ("leads", leads)):
+            object.__setattr__(self, name, value)
 
     def section_at(self, s: float) -> LaneSection:
         """The lane section at s; beyond the ends the first or last one. `s` in [m]."""
@@ -81,19 +86,22 @@ class Road:
         """Index of the lane section at s; beyond the ends the first or last one. `s` in [m]."""
         return max(bisect_right(self.section_starts, s) - 1, 0)
 
-    def reference_at(self, s: float) -> tuple[float, float, float]:
-        """x, y, heading of the reference line. [m], [rad]"""
+    def element_at(self, s: float) -> tuple[ReferenceElement, float]:
+        """The piece of the reference line at s, and how far along it that is. [m]"""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0
-        return self.elements[i].at(s - self.starts[i])
+        return self.elements[i], s - self.starts[i]
+
+    def reference_at(self, s: float) -> tuple[float, float, float]:
+        """x, y, heading of the reference line. [m], [rad]"""
+        element, along = self.element_at(s)
+        return element.at(along)
 
     def curvature_at(self, s: float) -> float:
         """Curvature of the reference line. [1/m]"""
-        i = bisect_right(self.starts, s) - 1
-        if i < 0:
-            i = 0
-        return self.elements[i].curvature_at(s - self.starts[i])
+        element, along = self.element_at(s)
+        return element.curvature_at(along)
 
     def stretch_of(self, lane: int, s: float) -> tuple[float, float, ReferenceElement, float, float]:
         """Range around s on one element of the reference line [m], that element, its start, and t of the lane. [m]
@@ -244,11 +252,7 @@ def lane_at(
 
 def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
     """The speed limit of (s, limit) records at s; inf where there is none. [m/s]"""
-    limit = inf
-    for start, value in speeds:
-        if start <= s:
-            limit = value
-    return limit
+    return next((value for start, value in reversed(speeds) if start <= s), inf)
 
 
 # ---- from x, y to s, t: the foot of the perpendicular on the reference line ----
@@ -267,18 +271,18 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     length = road.length
     s = min(max(guess, 0.0), length)
     low, high = -1.0, length + 1.0
-    leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
     for _ in range(MOST_ITERATIONS):
-        line_x, line_y, heading = road.reference_at(s)
+        element, along = road.element_at(s)
+        line_x, line_y, heading = element.at(along)
         dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
         ahead, across = dx * c + dy * d, dy * c - dx * d
-        if leans:
+        if road.leads:
             ahead -= road.surface.lead_at(s, across)
         if ahead >= 0.0:
             low = s
         if ahead <= 0.0:
             high = s
-        step = min(max(ahead / max(1.0 - road.curvature_at(s) * across, 0.2), -MAX_STEP), MAX_STEP)
+        step = min(max(ahead / max(1.0 - element.curvature_at(along) * across, 0.2), -MAX_STEP), MAX_STEP)
         moved = s + step
         if abs(step) > CONVERGED_STEP and (moved <= low or moved >= high):
             moved = 0.5 * (low + high)
@@ -291,8 +295,8 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
     ahead = dx * c + dy * d
     t = dy * c - dx * d
-    if leans:
+    if road.leads:
         ahead -= road.surface.lead_at(s, t)
-    if not road.surface.is_level:
+    if not road.is_level:
         t /= cos(road.surface.superelevation.at(s))
     return s, t, 0.0 if abs(ahead) < 1e-9 else ahead

@@ -166,9 +166,7 @@ class DrivingControllers:
         if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
             self._assign(content.controller)
         if isinstance(content, private_actions.OverrideControllerValueAction):
-            self._overridden = Domains.NONE
-            for domain, on in switches(content):
-                self._overridden |= domain if on else Domains.NONE
+            self._overridden = reduce(or_, _switched_on([content]), Domains.NONE)
             return
         if self._for_carla and isinstance(content, private_actions.ActivateControllerAction):
             self._assigned = [assigned for assigned in self._assigned if assigned.kind is not AUTOPILOT]
@@ -184,10 +182,8 @@ class DrivingControllers:
     @property
     def domains(self) -> Domains:
         """What they drive now."""
-        driven = Domains.NONE
-        for assigned in self._assigned:
-            driven |= assigned.kind.active(assigned.asked | self._overridden)
-        return driven
+        driven = (assigned.kind.active(assigned.asked | self._overridden) for assigned in self._assigned)
+        return reduce(or_, driven, Domains.NONE)
 
     def words(self) -> str:
         """Who drives what now; empty: nobody."""
@@ -277,9 +273,8 @@ def controlled_entities(scenario: Scenario) -> dict[str, Control]:
         contents = actions.get(entity.name, [])
         for controller in assigned[entity.name]:
             kind = kind_of(controller)
-            asked = Domains.BOTH if kind.at_once else Domains.NONE
-            for domain in _switched_on(content for content in contents if is_meant(controller, content)):
-                asked |= domain
+            switched = _switched_on(content for content in contents if is_meant(controller, content))
+            asked = reduce(or_, switched, Domains.BOTH if kind.at_once else Domains.NONE)
             if kind.active(asked):
                 names[named(controller)] = None
                 domains |= kind.active(asked)
@@ -330,8 +325,6 @@ def _mark(entity: Entity, controllers: Iterable[Controller]) -> str:
 
 def _private_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Action]]:
     for private in scenario.storyboard.init.privates:
-        for action in private.actions:
-            yield (private.entity_ref,), action
+        yield from (((private.entity_ref,), action) for action in private.actions)
     for at in scenario.storyboard.events():
-        for action in at.event.actions:
-            yield at.actors, action
+        yield from ((at.actors, action) for action in at.event.actions)

@@ -237,8 +237,7 @@ class Storyboard(Struct, frozen=True):
         """Every maneuver group, with what it is in, in file order."""
         for story in self.stories:
             for act in story.acts:
-                for group in act.maneuver_groups:
-                    yield story, act, group
+                yield from ((story, act, group) for group in act.maneuver_groups)
 
     def events(self) -> Iterator[StoryEvent]:
         """Every event, with what it is in, in file order."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -280,10 +281,8 @@ def explanations(measured: SensorData, view: SecondView | None = None, *, only_v
     if candidates and only_view:
         return candidates
     candidates.append(_explanation(measured, Colour()))
-    for order in ORDERS:
-        for alone in (False, True):
-            candidates += _of_family(measured, order, alone)
-    return candidates
+    families = (_of_family(measured, order, alone) for order in ORDERS for alone in (False, True))
+    return [*candidates, *chain.from_iterable(families)]
 
 
 def _of_family(measured: SensorData, order: int, alone: bool) -> Iterator[Explanation]:

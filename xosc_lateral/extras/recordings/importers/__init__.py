@@ -279,10 +279,7 @@ def importer(read: Callable[..., ImportedDrives]) -> Callable[..., ImportedDrive
 def _kept_rows(table: pd.DataFrame) -> pd.DataFrame:
     """Rows that are not cut, column by column: each goes as soon as it was taken from."""
     kept = (table.pop("state") == KEPT_ROWS).to_numpy()
-    columns = {}
-    for name in list(table.columns):
-        columns[name] = table.pop(name).array[kept]
-    return pd.DataFrame(columns, copy=False)
+    return pd.DataFrame({name: table.pop(name).array[kept] for name in list(table.columns)}, copy=False)
 
 
 def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
@@ -290,16 +287,13 @@ def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
     kept = (table["state"] == KEPT_ROWS).to_numpy() if "state" in table else np.ones(len(table), dtype=np.bool_)
     if not kept.any():
         return
-    for name in table.columns:
-        if table[name].dtype.kind not in "fiu":
-            continue
+    for name in (name for name in table.columns if table[name].dtype.kind in "fiu"):
         values = table[name].to_numpy(dtype=np.float64)
         believed = {"time": Range(-TIME.value, TIME.value, TIME.reason), **_POSITIONS}.get(name, context_range(name))
         wrong = kept & implausible_rows(name, values, believed)
         if name in _POSITIONS or name == "time":
             wrong |= kept & np.isnan(values)
-        allowed = 0.0 if name == "time" else MAX_OUTSIDE
-        if wrong.sum() > allowed * kept.sum():
+        if wrong.sum() > (0.0 if name == "time" else MAX_OUTSIDE) * kept.sum():
             value, share = values[int(np.argmax(wrong))], 100 * wrong.sum() / kept.sum()
             what = f"{value:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
             raise FormatError(f"{what}, {share:.0f} % of the rows", path=path, element=f"column {name!r}")

@@ -20,6 +20,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray, blocks, rate
 from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.lazy import pd, spatial
 from xosc_lateral.base.vehicle_classes import DRIVEN, TRUCKS
+from xosc_lateral.drivers.drives.cleaning import RUN
 from xosc_lateral.drivers.drives.drive import MAX_GAP
 from xosc_lateral.drivers.drives.evidence import of_registration
 from xosc_lateral.extras.recordings.cuts import (
@@ -27,7 +28,9 @@ from xosc_lateral.extras.recordings.cuts import (
     LANE_AGREEMENT,
     MOVING_SPEED,
     CutSettings,
-    cut_table,
+    lane_changes,
+    name_states,
+    number_runs,
     require_lane_direction,
 )
 from xosc_lateral.extras.recordings.importers import ImportedDrives, imported, importer
@@ -145,9 +148,8 @@ def import_placed(
     table = drive_table(placed, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    tracks = placed.tracks
     return imported(
-        table, settings=asdict(settings), step=tracks.step, dropped=tracks.dropped, notes=notes, **about
+        table, settings=asdict(settings), step=placed.tracks.step, dropped=placed.tracks.dropped, notes=notes, **about
     )  # fmt: skip
 
 
@@ -158,13 +160,12 @@ def drive_table(
     in which they are sought."""
     tracks, inside = placed.tracks, placed.piece >= 0
     is_truck = np.isin(tracks.kind, list(TRUCKS))
-    acceleration = rate(tracks.speed, tracks.time, 1.0, whose=tracks.vehicle)
     against = (tracks.speed > MOVING_SPEED) & (placed.take("agreement") < 0.0)
     reasons = {"no vehicle": ~np.isin(tracks.kind, ["", *DRIVEN]), "no lane": ~inside}
     reasons |= {"against the lane": against & inside} if against.any() else {}
     along = placed.take("along")
     middle = along if tracks.rear is None else along + tracks.rear  # gaps count from there
-    gone = np.zeros(0)
+    gone: Any = np.zeros(0)
     tracks = placed.tracks = replace(tracks, x=gone, y=gone, heading=gone, width=None, height=None, rear=None)
     del along
     near = beside if isinstance(beside, Mapping) else neighbour_columns(
@@ -172,27 +173,42 @@ def drive_table(
         is_truck, scale=placed.take("scale"),
     )  # fmt: skip
     del middle
+    vehicle, time, speed, kind = tracks.vehicle, tracks.time, tracks.speed, tracks.kind
+    tracks = placed.tracks = replace(tracks, vehicle=gone, time=gone, speed=gone, kind=gone, length=gone)
+    acceleration = rate(speed, time, 1.0, whose=vehicle)
     # A number that changes with the lane, and lateral position without jumps: a new piece ahead is no new lane.
     step = np.diff(placed.offset, prepend=placed.offset[:1])
-    same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
+    same = np.r_[False, vehicle[1:] == vehicle[:-1]]
     jump = same & (np.abs(step) > 0.5 * placed.lane_width)
     lane = np.cumsum(jump | (np.r_[False, inside[1:] != inside[:-1]] & same) | ~same).astype(np.int64)
     sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
     del step, same, jump
-    columns = {
-        "drive": pd.Series(tracks.names, dtype=str).take(tracks.vehicle).array,
-        "time": np.round(tracks.time, 4),
-        "offset": placed.offset,
-        "lane_width": placed.lane_width,
-        "speed": tracks.speed,
-        "acceleration": acceleration,
-        **placed.road,
-        **near,
-    }
-    return cut_table(
-        columns, settings, vehicle=tracks.vehicle, time=tracks.time, lane=lane, step=tracks.step, sideways=sideways,
-        reasons=reasons, kind=tracks.kind, is_truck=is_truck,
-    )  # fmt: skip
+    reasons["lane change"] = lane_changes(sideways, placed.offset, lane, vehicle, time, settings)
+    del sideways
+    state = name_states(reasons, lane, vehicle, time, tracks.step, settings)
+    runs = number_runs(state, lane, vehicle, time)
+    del lane
+    words = pd.concat([pd.Series(kind[part], dtype=str) for part in blocks(len(kind))], ignore_index=True).array
+    del kind
+    names = pd.Series(tracks.names, dtype=str).take(vehicle).array
+    del vehicle
+    return pd.DataFrame(
+        {
+            "drive": names,
+            "time": np.round(time, 4),
+            "offset": placed.offset,
+            "lane_width": placed.lane_width,
+            "speed": speed,
+            "acceleration": acceleration,
+            **placed.road,
+            **near,
+            "vehicle_class": words,
+            "is_truck": is_truck.astype(np.float64),
+            RUN: runs,
+            "state": state,
+        },
+        copy=False,
+    )
 
 
 # ---- lanes between two lines each ------------------------------------------------------------------------------------

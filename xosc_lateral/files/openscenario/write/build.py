@@ -277,7 +277,6 @@ class Vertices:
             before = rest[:at]
             yield before
             indent = before[before.rfind(b"\n") + 1 :].decode()
-            for text in self._polylines[int(number)].text(indent, unit):
-                yield text.encode()
+            yield from map(str.encode, self._polylines[int(number)].text(indent, unit))
             rest = after
         yield rest

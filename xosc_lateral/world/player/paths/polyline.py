@@ -207,11 +207,11 @@ def _is_apart(a: Corner, b: Corner, radius: float) -> bool:
 
 def _lifted(corners: Sequence[Corner]) -> tuple[Corner, ...]:
     """A piece that leads up to a height begins at the height of the road."""
-    lifted = list(corners)
-    for i, (a, b) in enumerate(itertools.pairwise(corners)):
-        if a.z != a.z and b.z == b.z:
-            lifted[i] = replace(a, z=a.road_z if a.road_z == a.road_z else b.z)
-    return tuple(lifted)
+    lifted = (
+        replace(a, z=a.road_z if a.road_z == a.road_z else b.z) if a.z != a.z and b.z == b.z else a
+        for a, b in itertools.pairwise(corners)
+    )
+    return *lifted, *corners[-1:]
 
 
 def _pitches(corners: Sequence[Corner], lengths: Sequence[float]) -> tuple[float, ...]:
