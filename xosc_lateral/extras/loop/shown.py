@@ -68,8 +68,7 @@ def what_drives_show(search: Search, fitted: Fitted, *, plan: bool = False) -> l
 
 def _entry(fitted: Fitted, what: str, acts: str, why: str, smallest: float, bound: float) -> Shown:
     """Sizes of the spread are logarithms until here."""
-    minutes = float(fitted.coarse.valid.sum()) / 60.0
-    more = minutes * max((smallest / AIMS[acts]) ** 2 - 1.0, 0.0)
+    more = float(fitted.coarse.valid.sum()) / 60.0 * max((smallest / AIMS[acts]) ** 2 - 1.0, 0.0)
 
     def stated(size: float) -> float | None:
         return None if size > LARGEST_SIZES[acts] else float(np.exp(size)) if acts == "spread" else size
