@@ -141,6 +141,12 @@ def closed(spec: Spec) -> list[Finding]:
             if off > max(0.03, 2.0 * float(stated.error)):
                 out.append({"kind": "a sentence is not what is sampled", "size": off, "said": False})
     by_time = spec["kind"] != "bends" and not act.columns
+    if not by_time:
+        hidden = [one for one in findings if not one.columns]
+        out += [
+            {"kind": f"nothing hidden acts: {one.kind}", "size": abs(float(one.size_m)), "said": False}
+            for one in hidden
+        ]
     missed = all(one.columns for one in findings) if by_time else bool(act.columns) and not columns & set(act.columns)
     if missed:
         acts, size = _planted(spec)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import optimize, stats
 
 from tests.kit.coarse import PAD, SPREAD, STEP, coarse_of, movement, wander
 from xosc_lateral.drivers.model.effects import Acts, Factor, Linear, Product
 from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
-from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, regress, slope_alike
+from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, regress, slope_alike, slopes_where_it_acts
 from xosc_lateral.extras.loop.model import Fitted, fit_model
 from xosc_lateral.extras.loop.selection import BY_PRODUCT, ERROR_BUDGET, Accepted, Selection, select
 from xosc_lateral.extras.loop.shown import Shown, what_drives_show
@@ -211,6 +211,36 @@ def test_what_acts_in_some_drives_is_named_with_them_and_the_size_that_it_has_th
     assert abs(told.size_m - 0.15 * reach) < 2.0 * told.size_error < 0.3 * reach
     assert not found.term.predictable(fitted)  # so no held-out drive is a veto: each has a slope of its own
     assert fitted.effects_of(found.term)[0].between_drivers[0] > 0.02  # type: ignore[attr-defined]
+
+
+def test_a_size_where_it_acts_is_not_drawn_to_where_it_does_not() -> None:
+    """Quicker responses stand out where what half of the drives do not show counts as slow noise: a sixth was lost."""
+    slopes, sizes = 0.2 * np.array([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0]), []
+    for seed in range(4):
+        coarse = some_drives(seed, slopes, 240.0)
+        found = MeanTerm.test(search_of(coarse, "x", "idle"), fit_model(coarse, ()))
+        assert found is not None and found.term is not None and found.after is not None
+        told = found.term.describe(found.after, found.after.effects_of(found.term), "mean 0")
+        sizes.append(told.size_m / (0.2 * np.subtract(*np.quantile(coarse.context["x"], [0.95, 0.05]))))
+        assert found.term.effect.response_s == pytest.approx(2.0, abs=0.7)  # type: ignore[attr-defined]
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.08)
+
+
+def test_slopes_of_some_drives_are_likeliest_of_two_groups() -> None:
+    """By an optimiser that knows nothing of expectation and maximisation."""
+    slopes = np.array([1.25, 0.9, 0.05, -0.1, 0.75, 0.12, -0.04, 0.0])
+    noise = 0.01 * np.linspace(0.7, 1.4, 8)
+
+    def unlikely(x: np.ndarray) -> float:
+        share = 1.0 / (1.0 + np.exp(-x[2]))
+        acts = share * stats.norm.pdf(slopes, x[0], np.sqrt(np.exp(x[1]) + noise))
+        return -float(np.log(acts + (1.0 - share) * stats.norm.pdf(slopes, 0.0, np.sqrt(noise))).sum())
+
+    usual, scatter = (best := optimize.minimize(unlikely, [0.8, -3.0, 0.0], method="Nelder-Mead").x)[0], np.exp(best[1])
+    likely = slopes_where_it_acts(slopes, noise, 1.0)
+    expected = usual + scatter / (scatter + noise) * (slopes - usual)
+    np.testing.assert_allclose(likely[[0, 1, 4]], expected[[0, 1, 4]], rtol=0.01)
+    assert np.abs(likely[[2, 3, 5, 6, 7]]).max() < 0.1
 
 
 @pytest.mark.parametrize("drives", [8, 24])

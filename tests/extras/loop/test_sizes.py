@@ -49,7 +49,7 @@ def test_a_time_constant_is_found_between_the_dictionarys(passed: Coarse) -> Non
     """A grid of half as long again would put the size 15 % off."""
     bare = fit_model(passed, ())
     problem = MeanTerm.problem(bare)
-    refinement = Refinement(passed, problem, np.zeros((len(problem.observed), 0)), {})
+    refinement = Refinement(passed, problem, np.zeros((len(problem.observed), 0)), [])
     columns = {"truck": Column("truck", Values.SWITCH, gaps=False, levels=(0.0, 1.0))}
     found = refinement.refine(structs.replace(term().effect, lag_s=0.0, response_s=4.0), 0.0, columns).effect
     assert found.lag_s == pytest.approx(LAG, abs=0.4)
@@ -66,7 +66,7 @@ def test_a_product_turns_its_sign_where_the_driver_does() -> None:
     moved = table.assign(distance_left=left, distance_right=right, speed=speed, bend=bend)
     coarse = Coarse.of(join_drives(drives_of_table(moved, {})))
     problem = MeanTerm.problem(fit_model(coarse, ()))
-    refinement = Refinement(coarse, problem, np.zeros((len(problem.observed), 0)), {})
+    refinement = Refinement(coarse, problem, np.zeros((len(problem.observed), 0)), [])
     factors = (Factor(column="bend"), Factor(column="speed", at=float(np.median(speed))))
     found = refinement.refine(Product(acts=Acts.LOCATION, factors=factors), 0.0, {}).effect
     assert isinstance(found, Product)

@@ -64,8 +64,7 @@ class MovementProcess:
         from scipy.signal import lfilter
 
         warm = 20 * self.order + 200
-        noise = rng.normal(size=(runs, n + warm))
-        return np.asarray(lfilter([1.0], self.polynomial, noise, axis=1)[:, warm:])
+        return np.asarray(lfilter([1.0], self.polynomial, rng.normal(size=(runs, n + warm)), axis=1)[:, warm:])
 
 
 def positions_in_run(valid: BoolArray) -> IndexArray:
@@ -145,8 +144,7 @@ def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
         before = predictors[-1]
         predictors.append(np.concatenate([before - last * before[::-1], [last]]))
         shares.append(shares[-1] * (1.0 - last**2))
-    deviations = np.sqrt(variance * np.asarray(shares) / shares[-1])
-    return MovementProcess(tuple(predictors), deviations)
+    return MovementProcess(tuple(predictors), np.sqrt(variance * np.asarray(shares) / shares[-1]))
 
 
 def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:

@@ -180,8 +180,7 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
         return [Factor(column=name, form=Form.EQUALS, at=level) for level in column.levels]
     if column.values is Values.SWITCH:
         low, high = min(column.levels), max(column.levels)
-        of_its_own = Factor(column=name, form=Form.EQUALS, at=high)
-        return [Factor(column=name) if (low, high) == (0.0, 1.0) else of_its_own]
+        return [Factor(column=name) if (low, high) == (0.0, 1.0) else Factor(column=name, form=Form.EQUALS, at=high)]
     if column.gaps:
         there, scale = Factor(column=name, form=Form.PRESENCE), _scale(values, 0.5)
         return [there, Factor(column=name, form=Form.PROXIMITY, at=scale)] if scale > 0.0 else [there]

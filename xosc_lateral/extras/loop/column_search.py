@@ -28,7 +28,7 @@ from xosc_lateral.extras.loop.dictionary import (
     orthonormal,
     score_entries,
 )
-from xosc_lateral.extras.loop.drives import counted
+from xosc_lateral.extras.loop.drives import OwnSlopes, counted
 from xosc_lateral.extras.loop.model import Fitted, Outcome, fit_model
 from xosc_lateral.extras.loop.omnibus import courses
 from xosc_lateral.extras.loop.refinement import Refined, Refinement
@@ -65,6 +65,10 @@ class SearchedTerm(ColumnTerm):
     @classmethod
     def reweighted(cls, fitted: Fitted, after: Fitted) -> WhitenedRegression | None:
         """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    def own_slopes(self, fitted: Fitted) -> OwnSlopes | None:
+        """How it differs from drive to drive; None: nobody asks."""
         return None
 
     @classmethod
@@ -159,11 +163,12 @@ class ColumnSearch:
                 entry, own_p = self.in_some_drives(scored, refused)
                 if entry is not None and self.kind.passes(self.search, own_p, self.fitted):
                     some: SearchedTerm = self.kind.of(scored.dictionary.timed(entry))
-                    after = fit_model(self.fitted.coarse, (*self.fitted.terms, some))
+                    some, after = self._where_it_acts(some, scored)
                     return Outcome(some, some.columns, own_p, after, unsure=True)
                 return Outcome(None, likeliest.columns, p_value)
             term, after = self._term(scored, refused)
             if not grows(self.fitted, after) and after.log_likelihood >= self.fitted.log_likelihood - ROUNDING:
+                term, after = self._where_it_acts(term, scored)
                 return Outcome(term, term.columns, p_value, after, unsure=bool(self._simplified))
             refused.add(term.columns)
             scored = self._scored(scored.problem, scored.dictionary, refused)
@@ -270,9 +275,10 @@ class ColumnSearch:
         @cache
         def span(column: str) -> FloatArray:
             rows = [i for i, candidate in enumerate(candidates) if candidate.columns == (column,)]
-            course = courses(search.quantities, problem.whitener, problem.whitener.valid, (column,))
-            both = [dictionary.rows[rows].astype(np.float64).T, *course.values()]
-            return orthonormal(np.concatenate(both, axis=1), CROSS_BASIS)
+            course = courses(search.quantities, problem.whitener, problem.whitener.valid, (column,)).values()
+            return orthonormal(
+                np.concatenate([dictionary.rows[rows].astype(np.float64).T, *course], axis=1), CROSS_BASIS
+            )
 
         @cache
         def by_drive(column: str) -> FloatArray:
@@ -296,8 +302,7 @@ class ColumnSearch:
         after = fit_model(coarse, (*terms, term))
         best: Refined | None = None
         for _ in range(ROUNDS):
-            problem = self.kind.reweighted(self.fitted, after)
-            here = scored if problem is None else self._scored(problem, refused=refused, draws=0)
+            here = self._again(scored, after, refused)
             if here is None:
                 break
             refined, other = self._refined(here)
@@ -306,15 +311,36 @@ class ColumnSearch:
                 break
             same = other.columns == term.columns
             best, term, after = refined, other, other_after
-            if same or problem is None:
+            if same or here is scored:
                 break
         return term, after
+
+    def _again(self, scored: _Scored, after: Fitted, refused: Collection[tuple[str, ...]]) -> _Scored | None:
+        """Scored with the noise that is left in `after`."""
+        problem = self.kind.reweighted(self.fitted, after)
+        return scored if problem is None else self._scored(problem, refused=refused, draws=0)
+
+    def _where_it_acts(self, term: SearchedTerm, scored: _Scored) -> tuple[SearchedTerm, Fitted]:
+        """A term and the fit with it; where drives surely differ, in the shape and timing that it has where it acts.
+
+        By one slope for all, what a drive does not show is noise as slow as the column. Quick responses and odd shapes
+        stand out against that, and sizes come out a sixth too small.
+        """
+        coarse, terms = self.fitted.coarse, self.fitted.terms
+        after = fit_model(coarse, (*terms, term))
+        slopes = term.own_slopes(after)
+        here = self._again(scored, after, ()) if slopes is not None and slopes.differ else None
+        if slopes is None or here is None:
+            return term, after
+        refinement = Refinement(coarse, here.problem, here.known, here.dictionary.candidates, slopes.each)
+        refined = refinement.refine(term.effect, np.inf, self.search.columns)  # any shape that has a price is better
+        term = self.kind.of(refined.effect, term.alike)
+        return term, fit_model(coarse, (*terms, term))
 
     def _refined(self, scored: _Scored) -> tuple[Refined, SearchedTerm]:
         """Refine the best sets of columns; the best of them, which knows what others explain as much."""
         search, candidates = self.search, scored.dictionary.candidates
-        costs = {candidate.family: candidate.cost for candidate in candidates}
-        refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
+        refinement = Refinement(search.coarse, scored.problem, scored.known, candidates)
         outcomes = [
             refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
             for index in scored.contenders()

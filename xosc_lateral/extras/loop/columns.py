@@ -88,8 +88,7 @@ _NEUTRAL_WORDS = frozenset(
 
 def proposed_role(column: str) -> Role:
     """What a column's name says it is."""
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)
-    words = set(re.split(r"[^a-z]+", spaced.lower()))
+    words = set(re.split(r"[^a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column).lower()))
     if words & _NEUTRAL_WORDS:
         return Role.UNKNOWN
     return next((role for role, known in _ROLE_WORDS if words & known), Role.UNKNOWN)
@@ -330,8 +329,7 @@ def _left(values: FloatArray, design: FloatArray) -> float:
     scaled = design / np.maximum(np.sqrt(np.mean(design**2, axis=0)), 1e-300)
     gram = scaled.T @ scaled
     gram[np.diag_indices(len(gram))] *= 1.0 + 1e-10
-    sizes = np.linalg.lstsq(gram, scaled.T @ values, rcond=None)[0]
-    return float(np.mean((values - scaled @ sizes) ** 2))
+    return float(np.mean((values - scaled @ np.linalg.lstsq(gram, scaled.T @ values, rcond=None)[0]) ** 2))
 
 
 class _Segments:

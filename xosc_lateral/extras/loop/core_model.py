@@ -104,8 +104,13 @@ class DriverVariance:
     def described(self) -> Description:
         """One pooled driver can't be many."""
         shape = f"{self.drives} drives; their spreads scatter by a factor of {np.exp(self.log_spread):.2f}"
-        error = self.shift / float(np.sqrt(2.0 * self.drives))
-        return Description("drivers that differ", shape, self.shift, error, "quantiles of local spread")
+        return Description(
+            "drivers that differ",
+            shape,
+            self.shift,
+            self.shift / np.sqrt(2.0 * self.drives),
+            "quantiles of local spread",
+        )
 
 
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:

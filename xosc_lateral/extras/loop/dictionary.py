@@ -151,8 +151,7 @@ def respond_by_second(values: Reals, response_s: float, drive: IndexArray) -> Fl
     keep = float(np.exp(-1.0 / response_s))
     late = response_s * (1.0 - keep)
     later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
-    response = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
-    return start_anew(response, values, keep, drive)
+    return start_anew(lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0], values, keep, drive)
 
 
 def score_entries(
@@ -199,8 +198,7 @@ def _beside_loud_stretches(
     rest = np.empty_like(rows)
     for read in set(columns):  # what some response to the same columns explains is not loudness
         alike = [k for k, others in enumerate(columns) if others <= read or read <= others][:RESPONSE_ENTRIES]
-        span = orthonormal(rows[alike].T)
-        rest[[others == read for others in columns]] = beside(span, left)
+        rest[[others == read for others in columns]] = beside(orthonormal(rows[alike].T), left)
     robust, costs = scores.copy(), dictionary.costs[order]
     robust[order] = (scores[order] + costs) / _loudness(rows, rest, left) - costs
     return robust
@@ -301,8 +299,7 @@ class Search:
     ) -> Search:
         """Evaluate all candidates once."""
         inside = coarse.timeline.valid
-        seen = {column.name: coarse.context[column.name][inside] for column in columns}
-        every = candidates_of(columns, seen)
+        every = candidates_of(columns, {column.name: coarse.context[column.name][inside] for column in columns})
         factors = {factor for one in every if isinstance(one.effect, Product) for factor in one.effect.factors}
         barred = {factor for factor in factors if tells_drives(factor.values(coarse.context), coarse)}
         candidates = [

@@ -11,6 +11,7 @@ References
 .. [2] R. C. Paule, J. Mandel, "Consensus values and weighting factors", J. Research NBS 87, 1982.
 .. [3] G. Knapp, J. Hartung, "Improved tests for a random effects meta-regression with a single covariate", Statistics
        in Medicine 22, 2003.
+.. [4] B. Efron, "Microarrays, empirical Bayes and the two-groups model", Statistical Science 23, 2008.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc, ndtri, stdtr, stdtrit
+from scipy.special import expit, fdtrc, logit, ndtri, stdtr, stdtrit
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.extras.loop.dictionary import beside
@@ -129,20 +130,39 @@ def regress(values: FloatArray, noise: FloatArray, column: FloatArray) -> Pooled
     return Pooled(slope, float(np.sqrt(factor * inverse[1, 1])), degrees, len(values))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OwnSlopes:
     """Whether an effect differs from drive to drive: each drive's slope over the common one."""
 
     p_value: float  # That slopes scatter as much though all are alike. [-]
     scatter: float  # Standard deviation between drives. [-]
     there: tuple[str, ...]  # Drives in which it surely acts, by name.
-    size_there: float  # Mean slope of those, each as likely as its own and all drives' say [2]_, with its error. [-]
-    error_there: float
+    size_there: float  # Mean slope of those, as its own and those of the others in which it acts say [4]_. [-]
+    error_there: float  # Its standard error. [-]
+    each: FloatArray  # Slope of every drive, shape (drives,). [-]
 
     @property
     def differ(self) -> bool:
         """Whether drives surely differ."""
         return self.p_value <= OWN_LEVEL
+
+
+def slopes_where_it_acts(slopes: FloatArray, noise: FloatArray, usual: float) -> FloatArray:
+    """Likely slopes of drives in some of which nothing acts, shape (drives,), from their own with variances `noise`.
+
+    Where it acts slopes scatter about a mean of their own, `usual` or so, as a normal distribution; elsewhere there is
+    none [4]_. Expectation and maximisation by turns. To take all drives for one normal distribution would draw those
+    in which it acts towards those in which it does not.
+    """
+    scatter, acts = float(noise.mean()), np.full(len(slopes), 0.5)
+    for _ in range(ROUNDS):
+        variance, share = scatter + noise, logit(float(np.clip(acts.mean(), SURE_LEVEL, 1.0 - SURE_LEVEL)))
+        nearer = np.square(slopes) / noise - np.square(slopes - usual) / variance + np.log(noise / variance)
+        acts = expit(share + 0.5 * nearer)
+        usual = float(np.average(slopes, weights=acts / variance))
+        likely = usual + scatter / variance * (slopes - usual)
+        scatter = float(np.average(np.square(likely - usual) + scatter * noise / variance, weights=acts))
+    return np.asarray(acts * likely)
 
 
 def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes | None:
@@ -158,18 +178,17 @@ def own_slopes(rows: FloatArray, path: FloatArray, coarse: Coarse) -> OwnSlopes 
     minutes = float(moved.sum() ** 2 / max(float(moved @ moved), 1e-300))
     if number < FEWEST or minutes <= number:
         return None
-    slopes = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
-    left = np.bincount(coarse.cluster, path * (rows - slopes[coarse.drive] * path) * inside)
-    weight, slopes = power[lasting], slopes[lasting]
+    each = np.bincount(coarse.drive, path * rows, minlength=coarse.drives) / np.maximum(power, 1e-300)
+    left = np.bincount(coarse.cluster, path * (rows - each[coarse.drive] * path) * inside)
+    weight, slopes = power[lasting], each[lasting]
     variance = max(float(left @ left) / float(weight.sum()) * minutes / (minutes - number), 1e-300)
     mean, noise = float(weight @ slopes / weight.sum()), variance / weight
     scatter = float(weight @ np.square(slopes - mean)) / variance
     p_value = max(float(fdtrc(number - 1, minutes - number, scatter / (number - 1))), MINIMUM_P)
     between = max(float((1.0 / weights_between(slopes, noise, np.ones((number, 1))) - noise).mean()), 0.0)
     sure = np.sign(mean) * slopes > -float(ndtri(SURE_LEVEL / number)) * np.sqrt(noise)
-    known = between / np.maximum(between + noise, 1e-300)  # share of its slope that a drive knows itself
-    likely, scale = mean + known * (slopes - mean), max(abs(mean), 1e-300)
-    size = float(likely[sure].mean()) if sure.any() else mean
-    error = float(np.sqrt(np.sum((known * noise)[sure]))) / max(int(sure.sum()), 1)
+    there, scale = sure if sure.any() else np.ones_like(sure), max(abs(mean), 1e-300)
+    size = float(slopes_where_it_acts(slopes, noise, float(slopes[there].mean()))[there].mean())
+    error = float(np.sqrt(noise[there].sum())) / int(there.sum()) / scale
     names = tuple(np.array(coarse.timeline.names)[lasting][sure].tolist())
-    return OwnSlopes(p_value, float(np.sqrt(between)) / scale, names, size / mean if mean else 0.0, error / scale)
+    return OwnSlopes(p_value, float(np.sqrt(between)) / scale, names, size / mean if mean else 0.0, error, each)

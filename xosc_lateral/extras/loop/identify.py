@@ -76,8 +76,7 @@ class Identified:
         out = self.selection.without(terms, why)
         if not out.accepted:
             return replace(self, selection=out, nested=None, total=None, returned_base=why)
-        kept = [one.term for one in out.accepted]
-        nested = None if self.nested is None else self.nested.only(kept, terms)
+        nested = None if self.nested is None else self.nested.only([one.term for one in out.accepted], terms)
         return replace(self, selection=out, nested=nested)
 
 
@@ -124,8 +123,7 @@ def name_time_beside(search: Search, selection: Selection) -> Selection:
             continue
         by_time = fit_model(search.coarse, (*without.terms, test.term))
         if by_time.log_likelihood > selection.final.log_likelihood - AS_LIKELY:
-            term = replace(before, alike=(*before.alike, ("time",)))
-            selection = selection.exchanged(before, term)
+            selection = selection.exchanged(before, replace(before, alike=(*before.alike, ("time",))))
     return selection
 
 
@@ -249,8 +247,7 @@ def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArr
     """Of every valid row in `held`, shape (n,), with the autoregression of `noise`; 0 elsewhere."""
     rows = coarse.valid & held
     columns, scales, known = design_of(fitted.coarse, fitted.terms)
-    scale = np.exp(scales @ fitted.log_sizes + known)
-    whitener = Whitener(noise.whitener.process, rows, coarse.drive, scale)
+    whitener = Whitener(noise.whitener.process, rows, coarse.drive, np.exp(scales @ fitted.log_sizes + known))
     squares = np.square(whitener.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
     typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
     level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical

@@ -145,8 +145,7 @@ class MovingStatistic:
 
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many `seconds` > 0. [m]"""
-    timeline = result.coarse.timeline
-    return _moving(result, lambda runs: local_mean(runs.mean(axis=0), timeline.valid, seconds))
+    return _moving(result, lambda runs: local_mean(runs.mean(axis=0), result.coarse.timeline.valid, seconds))
 
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:

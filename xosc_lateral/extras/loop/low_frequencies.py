@@ -50,8 +50,7 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
     # of a short drive all of them would take ordinary wander along, and the rest would look whiter than it is
     number = int(np.clip(2.0 * coarse.valid.sum() / coarse.drives / UNSEEN_S, 1, max(ORDERS)))
     slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, number)]) * coarse.valid[:, None]
-    basis = np.linalg.qr(slow)[0]
-    movement = np.where(coarse.valid, beside(basis, left) / fitted.scale, 0.0)
+    movement = np.where(coarse.valid, beside(np.linalg.qr(slow)[0], left) / fitted.scale, 0.0)
     process = fit_autoregression(movement, coarse.valid, ORDER, longest=MAXIMUM_ORDER)
     whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
     return whitener.rows(left), whitener
@@ -80,8 +79,7 @@ def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence
         others = len(rows) - basis.shape[1]
         if basis.shape[1] and others > 0:
             explained = float(np.sum(np.square(basis.T @ rows)))
-            left = max(float(rows @ rows) - explained, 1e-300)
-            ratio = explained / basis.shape[1] / (left / others)
+            ratio = explained / basis.shape[1] / (max(float(rows @ rows) - explained, 1e-300) / others)
             p_values[order] = max(float(fdtrc(basis.shape[1], others, ratio)), MINIMUM_P)
     return p_values
 

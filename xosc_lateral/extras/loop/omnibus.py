@@ -68,8 +68,7 @@ def tents(values: FloatArray, drive: IndexArray) -> FloatArray:
 def amid_runs(valid: BoolArray) -> BoolArray:
     """Rows whose delays stay within their run, shape (n,): where a run ends in a lane change is no response."""
     before = positions_in_run(valid)
-    after = positions_in_run(valid[::-1])[::-1]
-    return np.asarray((before >= DELAYS[-1]) & (after >= -DELAYS[0]))
+    return np.asarray((before >= DELAYS[-1]) & (positions_in_run(valid[::-1])[::-1] >= -DELAYS[0]))
 
 
 def courses(

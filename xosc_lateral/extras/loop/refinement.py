@@ -17,7 +17,7 @@ from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.drivers.model.effects import ColumnEffect, Product
 from xosc_lateral.drivers.model.effects.shapes import Form
 from xosc_lateral.extras.loop.autocorrelation import WhitenedRegression
-from xosc_lateral.extras.loop.candidates import FINE_SCALES, Family, shapes_of
+from xosc_lateral.extras.loop.candidates import FINE_SCALES, Candidate, Family, shapes_of
 from xosc_lateral.extras.loop.columns import Column
 from xosc_lateral.extras.loop.dictionary import LIKELIHOOD_MARGIN, beside, of_unit_variance, orthonormal
 from xosc_lateral.extras.loop.timeline import COARSE, Coarse
@@ -54,12 +54,23 @@ class Refined:
 
 
 class Refinement:
-    """Scores many effects at once beside all that is `known` (orthonormal, shape (seconds, k))."""
+    """Scores many effects at once beside all that is `known` (orthonormal, shape (seconds, k)).
+
+    `slopes`: how strongly each effect acts in every drive, shape (drives,), where drives differ.
+    """
 
     def __init__(
-        self, coarse: Coarse, problem: WhitenedRegression, known: FloatArray, costs: Mapping[Family, float]
+        self,
+        coarse: Coarse,
+        problem: WhitenedRegression,
+        known: FloatArray,
+        candidates: Sequence[Candidate],
+        slopes: FloatArray | None = None,
     ) -> None:
-        self._coarse, self._problem, self._costs = coarse, problem, costs
+        self._coarse, self._problem = coarse, problem
+        self._costs = {candidate.family: candidate.cost for candidate in candidates}
+        of_drives = np.ones(coarse.drives) if slopes is None else slopes
+        self._slopes = of_drives[coarse.drive[problem.whitener.valid], None].astype(np.float32)
         self._basis = known.astype(np.float32)
         self._left = of_unit_variance(beside(known, problem.observed))
         self._quantities: dict[ColumnEffect, FloatArray] = {}
@@ -96,7 +107,7 @@ class Refinement:
 
     def _rows(self, responses: FloatArray) -> FloatArray:
         """White, beside what is known; in single precision, which tells responses apart as well in half the time."""
-        rows = self._problem.rows(responses.astype(np.float32))
+        rows = self._slopes * self._problem.rows(responses.astype(np.float32))
         rows -= self._basis @ (self._basis.T @ rows)
         return rows
 

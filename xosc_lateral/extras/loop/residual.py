@@ -95,8 +95,7 @@ def statistics_of(
         # the mean where there is none, the farthest where nobody is within reach
         usual, farthest = (seen.mean(), seen.max()) if len(seen) else (0.0, 0.0)
         filled = np.nan_to_num(values, nan=usual, posinf=farthest, neginf=usual)
-        smooth = in_digits(timeline.respond(filled, 0.0, RESPONSE_S))
-        label, middle = _binned(smooth, timeline.valid, none)
+        label, middle = _binned(in_digits(timeline.respond(filled, 0.0, RESPONSE_S)), timeline.valid, none)
         label[missing_throughout(values, timeline)] = -1
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
@@ -227,8 +226,7 @@ def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArra
         return np.full(len(BANDS_S) + 1, np.nan)
     levels = (offset, *(local_mean(offset, timeline.valid, seconds) for seconds in BANDS_S))
     inside = [level[used] for level in levels]
-    bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
-    return np.array([*bands, np.std(inside[-1])])
+    return np.array([*[np.std(finer - coarser) for finer, coarser in pairwise(inside)], np.std(inside[-1])])
 
 
 def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequency: float) -> float:
@@ -254,8 +252,7 @@ def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntA
     label = np.where(none, len(edges) + 1, label)
     used, label = np.unique(label, return_inverse=True)
     inside = [valid & ~none & (label == index) for index in range(len(used))]
-    middle = np.array([values[rows].mean() if rows.any() else np.nan for rows in inside])
-    return label.astype(np.intp), middle
+    return label.astype(np.intp), np.array([values[rows].mean() if rows.any() else np.nan for rows in inside])
 
 
 def _time_bins(timeline: Timeline) -> tuple[IntArray, FloatArray]:

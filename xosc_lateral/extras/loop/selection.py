@@ -270,8 +270,7 @@ def is_undone_by_levels(fitted: Fitted, term: Term) -> bool:
     says = coarse.by_drive(scales[:, part] @ fitted.log_sizes[part])
     level = coarse.by_drive(np.log(fitted.scale) - scales @ fitted.log_sizes - known)
     says, level = (np.sqrt(seconds) * (one - np.average(one, weights=seconds)) for one in (says, level))
-    drives = np.arange(coarse.drives)
-    (slope,), ((variance,),) = clustered_least_squares(says[:, None], level, drives)
+    (slope,), ((variance,),) = clustered_least_squares(says[:, None], level, np.arange(coarse.drives))
     error = float(np.sqrt(variance * small_sample_factor(counted, counted, 2)))
     return error > 0.0 and float(stdtr(counted - 2, (slope + 0.5) / error)) < UNDONE_LEVEL
 

@@ -99,8 +99,7 @@ def missing_throughout(values: FloatArray, timeline: Timeline) -> BoolArray:
     """Rows of drives of ten minutes and more without a single value: what was not measured says which drive it is."""
     there, gone = np.isfinite(values) & timeline.valid, np.zeros(len(values), dtype=np.bool_)
     for span in timeline.spans:
-        lasting = timeline.valid[span].sum() * timeline.step >= MIN_DRIFT_S
-        gone[span] = lasting and not there[span].any()
+        gone[span] = timeline.valid[span].sum() * timeline.step >= MIN_DRIFT_S and not there[span].any()
     return gone if there.any() else np.zeros(len(values), dtype=np.bool_)
 
 
@@ -187,8 +186,7 @@ def local_mean(values: FloatArray, valid: BoolArray, seconds: float) -> FloatArr
     counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
     index = np.arange(len(values))
     low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
-    count = counts[high] - counts[low]
-    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
+    return np.asarray((sums[high] - sums[low]) / np.maximum(counts[high] - counts[low], 1.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -212,8 +212,7 @@ class _Places:
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power
-        counted = (seconds >= MIN_SECONDS) & (power > 0.0)
-        noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
+        noise = np.where((seconds >= MIN_SECONDS) & (power > 0.0), 1.0 / np.maximum(power, 1e-300), np.inf)
         responses = (coarse.response(term.effect) for term in of_kind(fitted, BetweenTerm))
         usual = [coarse.by_drive(part) for response in responses for part in response.T]
         known = np.column_stack([np.ones(groups), *usual])

@@ -183,8 +183,7 @@ def probability_of_persistence(
     from scipy.fft import next_fast_len
 
     if known.shape[1]:
-        basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
-        squares = beside(basis, squares)
+        squares = beside(np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0], squares)
     lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
     weights = np.exp(-lags / np.asarray(MEMORIES_S)[:, None])
     scales = np.sqrt(valid.sum() * (weights**2).sum(axis=1))

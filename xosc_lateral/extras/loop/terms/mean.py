@@ -80,8 +80,7 @@ class MeanTerm(SearchedTerm):
 
     def predictable(self, fitted: Fitted) -> bool:
         """Not where drives surely differ: no other drive knows what it does in one, and their mean is right in none."""
-        slopes = self.own_slopes(fitted)
-        return slopes is None or not slopes.differ
+        return (slopes := self.own_slopes(fitted)) is None or not slopes.differ
 
     def matches(self, other: Term) -> bool:
         """Whatever its course over time."""
@@ -141,8 +140,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = beside(others, white(fitted.coarse.offset))
-    rows_known = beside(others, white(fitted.columns[:, part]))
-    estimated = _profile(rows_known, left, contrast)
+    estimated = _profile(beside(others, white(fitted.columns[:, part])), left, contrast)
     profiles = [estimated]
     for response in _timed(fitted, effect):
         rows = beside(others, white(response.reshape(len(response), -1)))
