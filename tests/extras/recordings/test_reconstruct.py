@@ -104,7 +104,8 @@ def test_a_recording_plays_as_it_was_driven_and_its_report_says_how_nearly(track
         across = (y - rows["y"]) * np.cos(h) - (x - rows["x"]) * np.sin(h)
         assert np.abs(along).max() < 0.3, name
         assert np.abs(across).max() < 0.7, name
-    assert "maneuver-based scenario" in (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
+    assert "where they were recorded to within" in page and '"views":["Maneuvers","Recorded"]' in page
     assert made.outputs
 
 

@@ -64,7 +64,7 @@ def test_the_command_line_takes_it_and_profiles_show_says_what_is_known(
     assert main(["profiles", "show", "motorway-vehicle-1"]) == 0
     assert "neighbours beside vehicles on either side: not known, does not move" in capsys.readouterr().out
     assert main(["profiles", "show", "motorway"]) == 0
-    usual = "beside vehicles on either side: moves for them as the drivers of its recording did"
+    usual = "beside vehicles on either side: responds as the drivers in the profile's recording did"
     assert usual in capsys.readouterr().out
     said = str(xl.convert(scenario, seed=1, time_limit=6.0))
     assert "beside vehicles" not in said, "of what is usual there is nothing to say"

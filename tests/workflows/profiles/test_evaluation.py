@@ -155,7 +155,7 @@ def test_a_refined_profile_says_what_the_loop_found():
 def test_a_shipped_card_says_what_the_look_at_the_fit_found_and_where_the_recording_ends(capsys):
     card = card_text(read_profile("motorway"))
     assert re.search(r"within 1.2 m of a marking [\d.]+% of the time, [\d.]+ excursions an hour, as measured", card)
-    assert re.search(r"look +motorway (drives as its drives do, by|does not drive as its drives do:)", card)
+    assert re.search(r"look +motorway (drives as its drives do, in all|does not drive as its drives do:)", card)
     assert "0 to 0.1 Hz (DLR Highway Traffic)" in card
     assert main(["profiles", "compare", "motorway", "rural"]) == 0
     said = capsys.readouterr().out

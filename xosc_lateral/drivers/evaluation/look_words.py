@@ -28,7 +28,7 @@ def in_words(profile: DriverProfile) -> str:
     if lacking:
         parts = ", ".join(f"{name} {numbers[name][0]:g} becomes {numbers[name][1]:g}" for name in lacking)
         return f"{driver} does not drive as its drives do: {parts}"
-    return f"{driver} drives as its drives do, by {len(numbers)} numbers" if numbers else ""
+    return f"{driver} drives as its drives do, in all {len(numbers)} numbers compared" if numbers else ""
 
 
 def margins_in_words(profile: DriverProfile) -> str:

@@ -212,7 +212,8 @@ def _recorded(runs: Sequence[Run], drives: Sequence[Drive]) -> list[tuple[Drive,
 
 # ---- what to know about a fitted profile before it is used: its sensor, how it can be driven, its band ----
 TRAFFIC_ACCELERATION = 0.6
-"""Twice what 99.9 % of real motorway traffic stays below: beyond, a profile probably holds a sensor's noise. [m/s2]"""
+"""Twice what 99.9 % of real motorway traffic stays below: beyond, a profile whose sensor was not told apart from its
+driver probably holds the sensor's noise. [m/s2]"""
 
 ERROR_RATIO = 1.15
 """A sensor's error found may be so many times the one given: by chance errors go along with the path. [-]"""
@@ -261,7 +262,7 @@ def _beside_given(profile: DriverProfile, stated: float | None) -> list[str]:
 
 def _coarse_steps(profile: DriverProfile) -> list[str]:
     sensor = profile.sensor
-    if sensor is None or sensor.driver_share != (0.0, 1.0):
+    if sensor is None or sensor.is_told_apart:
         return []
     deviation = np.sqrt(sensor.driver_variance + sensor.sensor_variance)
     if sensor.rounding <= COARSE_STEP_RATIO * deviation:  # little data, not steps
@@ -283,7 +284,7 @@ def _strained(profile: DriverProfile) -> list[str]:
             f"at most {strained.largest:.1f} m/s2, jerk at most {strained.jerk:.1f} m/s3 "
             f"(UN R79: {ACCELERATION_LIMIT:g} and {JERK_LIMIT:g}); convert will smooth it"
         ]
-    if strained.seldom > TRAFFIC_ACCELERATION:
+    if strained.seldom > TRAFFIC_ACCELERATION and not (profile.sensor and profile.sensor.is_told_apart):
         return [
             f"lateral acceleration of {profile.name} is above {strained.seldom:.2f} m/s2 for 0.1 % of the time, twice "
             "that of real motorway traffic or more: check the sensor that measured the drives"

@@ -150,7 +150,7 @@ SIGNIFICANT_ERRORS = 2.6
 """Standard errors from which a shift beside a vehicle is an effect: one of a hundred by chance. [-]"""
 
 UNMEASURED_RESPONSES = {
-    Basis.POPULATION: "moves for them as the drivers of its recording did",
+    Basis.POPULATION: "responds as the drivers in the profile's recording did",
     Basis.DECLARED: "moves as its effects state",
     Basis.MEASURED: "moves as its effects state",
     Basis.UNKNOWN: "not known, does not move",

@@ -54,6 +54,11 @@ class SensorModel(Record, frozen=True):
         total = self.driver_variance + self.sensor_variance
         return self.driver_variance / total if total > 0 else 1.0
 
+    @property
+    def is_told_apart(self) -> bool:
+        """Whether the measured rows show at all which part is the sensor's."""
+        return self.driver_share != (0.0, 1.0)
+
     def in_words(self) -> str:
         """How the measured variance is split, and what is known of the error, in a sentence."""
         low, high = self.driver_share

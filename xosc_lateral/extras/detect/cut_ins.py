@@ -148,6 +148,28 @@ class CutIns(Result):
             lead = f"{middle:.2f} ({low:.2f} to {high:.2f})" if len(leads) else "-"
             yield str(detector), f"{rows['seen'].mean():.0%}", f"{rows['seen_before_marking'].mean():.0%}", lead, alarms
 
+    def _finding(self) -> str:
+        """Who sees most of the cut-ins before the marking and who fewest, in a sentence."""
+        frame = self.to_frame()
+        early = frame.assign(lead=frame["lead"].where(frame["seen_before_marking"])).groupby("detector", sort=False)
+        seen = early["lead"].count().sort_values(ascending=False, kind="stable")
+        best, worst, count = str(seen.index[0]), str(seen.index[-1]), len(self.cases())
+        lead = f", {early['lead'].median()[best]:.2f} s before it in the median" if seen[best] else ""
+        alarms = int(early["false_alarms"].sum()[best])
+        others = f"; {worst} sees {seen[worst]}" if worst != best else ""
+        words = f"{alarms} false alarm{'s' * (alarms != 1)}"
+        return f"{best} sees {seen[best]} of {count} cut-ins before the marking{lead}, with {words}{others}."
+
+    def _case_by_case(self) -> Iterator[dict[str, Any]]:
+        """Rows of the page: a cut-in with its figures, and when each detector sees it."""
+        labels = self.to_frame()["detector"].unique()
+        names = [str(label).partition(" (")[0] for label in labels]
+        headings = dict(zip(labels, names if len({*names}) == len(names) else labels, strict=True))
+        for (number, vehicle, _), rows in self.to_frame().groupby(["set", "vehicle", "duration"], sort=False):
+            facts = {f"{name} [{unit}]": rows[name].iloc[0] for name, unit in FACTS.items()}
+            leads = dict(zip(rows["detector"].map(headings), rows["lead"], strict=True))
+            yield {"set": number, "vehicle": vehicle, "false alarms": int(rows["false_alarms"].sum()), **facts, **leads}
+
     def cases(self) -> pd.DataFrame:
         """One row per cut-in, whatever detectors made of it."""
         return self.to_frame().drop_duplicates(["set", "vehicle", "duration"])
@@ -186,12 +208,15 @@ class CutIns(Result):
 
     def _page(self) -> str:
         page = Page("Cut-ins as drivers take them")
-        page.lead(f"{self.headline()}.", *str(self.variations).splitlines()[1:])
+        page.lead(self._finding())
         page.section("Spread")
         page.figure(self.plot(), "How many cut-ins have at most such a value")
-        page.text(*self.legend())
+        page.text(f"{self.headline()}.", *str(self.variations).splitlines()[1:], *self.legend())
         page.section("Detectors")
         page.table([dict(zip(DETECTOR_HEADINGS, one, strict=True)) for one in self._detectors()], "Over all sets")
         page.section("Cut-ins")
-        page.table(list(self.rows), "Set by set")
+        page.table(
+            list(self._case_by_case()),
+            "How long before the side is on the marking each detector sees the cut-in [s], set by set; –: never",
+        )
         return page.html(self._provenance())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from enum import StrEnum
+from html import escape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
@@ -223,5 +224,5 @@ def _claim_row(finding: Finding) -> dict[str, object]:
         "figure": claim.figure if value is None else f"{value:.3g} {claim.unit}",
         "bound": claim.bound,
         "from": finding.origin,
-        "test": f"`{claim.test}`" if claim.test else "none",
+        "test": Html(escape(claim.test).replace("/", "/<wbr>").replace("_", "_<wbr>")) if claim.test else "none",
     }

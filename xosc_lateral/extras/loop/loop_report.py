@@ -241,8 +241,8 @@ def _add_findings(page: Page, result: LoopResult, proofs: Sequence[str]) -> None
                 f"Curve of {finding.effect} over measured points, and measured against expected before and after.",
             )
     if proofs:
-        caption = "The same stretch converted with an effect and without it, four seeds; the shift is measured there."
-        page.table([{"in a scenario": one} for one in proofs], caption)
+        page.text("In a scenario: the same stretch converted with an effect and without it, with four seeds.")
+        page.items(proofs)
     applied = (
         "`sample --context` and `convert` apply it where the context has the columns, and name the columns that are "
         "missing."

@@ -45,10 +45,11 @@ def page_of(facts: dict[str, Any], plans: Sequence[VehiclePlan], network: RoadNe
     numbers = facts["summary"]
     page = Page(f"{facts['name']}: from the recording to maneuvers")
     page.lead(
-        f"{numbers['vehicles']} vehicles of `{facts['recording']}`, {facts['window'][0]:.1f} to "
-        f"{facts['window'][1]:.1f} s, as a maneuver-based scenario: lane changes, a speed of straight pieces for each, "
-        "appearing and leaving. What maneuvers do not say, how somebody moves in the lane, is left to the driver "
-        "profiles in `drivers.csv`."
+        f"Maneuvers put the {numbers['vehicles']} vehicles of `{facts['recording']}`, {facts['window'][0]:.1f} to "
+        f"{facts['window'][1]:.1f} s, where they were recorded to within {numbers['along_p95']:.2f} m along the road "
+        f"(95 % of the time) and {numbers['across_rms']:.2f} m across it (rms).",
+        "They are lane changes, a speed of straight pieces for each, appearing and leaving. What they do not say, how "
+        "somebody moves in the lane, is left to the driver profiles in `drivers.csv`.",
     )
     figures = [
         KeyFigure(f"{numbers['vehicles']}", "vehicles", f"{numbers['duration']:g} s"),
@@ -107,7 +108,7 @@ def _scene(plans: Sequence[VehiclePlan], network: RoadNetwork, duration: float) 
         shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
         motions.append(motion)
         results.append(EntityResult(motion, (), None, "", (shown,), deviation, path))
-    return scene_of(MovingTraffic(FRAME, tuple(motions)), network, results)
+    return scene_of(MovingTraffic(FRAME, tuple(motions)), network, results, views=("Maneuvers", "Recorded"))
 
 
 def _planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:

@@ -47,13 +47,9 @@ class Conversion(ConvertedScenario, Result):
                 )
             elif entity.name not in self.egos:  # those are told
                 lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
-        alike: dict[str, list[str]] = {}
-        for entity in self.movement.entities:
-            if entity.is_enriched:
-                alike.setdefault(entity.beside(self.provenance.options["neighbours"]), []).append(entity.name)
         lines += [
             f"  {', '.join(names)}, {words}"
-            for words, names in alike.items()
+            for words, names in self.movement.responses(self.provenance.options["neighbours"]).items()
             if UNMEASURED_RESPONSES[Basis.POPULATION] not in words  # what is usual
         ]
         if self.provenance.options["with_sensor"]:

@@ -99,7 +99,10 @@ def _provenance(conversion: ConvertedScenario) -> dict[str, object]:
         "output": (conversion.output or conversion.source).name,
         "under test": list(made.ego) or "none",
         "written as": [f"{name}: {MODE_WORDS[mode]}" for name, mode in made.modes.items()],
-        "neighbours": [f"{one.name}: {one.beside(made.options['neighbours'])}" for one in driven],
+        "neighbours": [
+            f"{', '.join(names)}, {words}"
+            for words, names in conversion.movement.responses(made.options["neighbours"]).items()
+        ],
         "seed": made.options["seed"],
         "variant": made.variant,
         "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],

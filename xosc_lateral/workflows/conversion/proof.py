@@ -45,14 +45,14 @@ class Proof:
     start: float
     end: float
     shift: float  # mean over the stretch and over seeds, positive left [m]
-    error: float  # its standard error over seeds [m]
 
     def __str__(self) -> str:
         """In words."""
         side = "left" if self.shift > 0 else "right"
         return (
-            f"{' and '.join(self.columns)}: in `{self.scenario}` {self.vehicle} drives {abs(self.shift):.2f} "
-            f"+- {self.error:.2f} m further {side} with it than without it, {self.start:.0f} to {self.end:.0f} s"
+            f"In the template `{self.scenario}` '{self.vehicle}' drives {abs(self.shift):.2f} m "
+            f"further {side} with the effect of `{'` and `'.join(self.columns)}` than without it, from "
+            f"{self.start:.0f} to {self.end:.0f} s"
         )
 
 
@@ -73,8 +73,7 @@ def _proof(profile: DriverProfile, effect: ColumnEffect, converted: Converted) -
     shifts = (converted(name, vehicle) - _deviations(without, name, vehicle))[:, rows].mean(axis=1)
     driven = _played(name).motion.entities[vehicle]
     begin, end = driven.time[rows[[0, -1]]].tolist()
-    error = float(shifts.std(ddof=1) / np.sqrt(len(shifts)))
-    return Proof(effect.columns, name, driven.name, begin, end, float(shifts.mean()), error)
+    return Proof(effect.columns, name, driven.name, begin, end, float(shifts.mean()))
 
 
 @cache

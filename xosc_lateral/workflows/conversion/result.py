@@ -201,6 +201,14 @@ class Enriched:
         """Contacts and lane departures that nominally are none. [-]"""
         return len(self.new_contacts) + len(self.departures)
 
+    def responses(self, neighbours: str) -> dict[str, list[str]]:
+        """How drivers respond to vehicles beside them, a line each, with the names of those who do so."""
+        alike: dict[str, list[str]] = {}
+        for entity in self.entities:
+            if entity.is_enriched:
+                alike.setdefault(entity.beside(neighbours), []).append(entity.name)
+        return alike
+
     def contact_notes(self) -> Iterator[Note]:
         """Contacts that are new, and that are gone."""
         for gaps, what in (

@@ -74,10 +74,12 @@ def scene_of(
     results: Sequence[EntityResult | Remade] = (),
     *,
     names: Sequence[str] = (),
+    views: tuple[str, str] = ("As written", "Lifelike"),
 ) -> str:
     """JSON for the player: results with the nominal motion as ghosts, or the nominal motion alone.
 
-    `names`: of all vehicles in the order that decides on their colours; without: the motion's own
+    `names`: of all vehicles in the order that decides on their colours; without: the motion's own. `views`: titles of
+    the nominal motion and of that of the results, one below the other
     """
     pairs: list[tuple[EntityMotion, EntityResult | Remade | None]] = [(result.motion, result) for result in results]
     pairs = pairs or [(entity, None) for entity in motion.entities]
@@ -95,6 +97,7 @@ def scene_of(
         "step": round(float(rows[1] - rows[0]) * motion.step if len(rows) > 1 else FRAME_STEP, 9),
         "start": round(float(shown[0][1].time[0]), 3) if len(rows) else 0.0,
         "frames": len(rows),
+        "views": views,
         "across": round(_across(network, shown), 2),
         "entities": [_entity(network, number, each, result, rows, origin) for number, each, result in shown],
         **_roads(network, np.concatenate(places) if places else np.empty((0, 2)), origin),

@@ -198,7 +198,8 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
     runs, step = free_runs(profile, seed), profile.model.step
     (summary, keeping), known = figures_of(profile, seed), profile.provenance
     page = Page(f"Driver profile {profile.name}")
-    page.lead(noted(profile))
+    look = look_words.in_words(profile)
+    page.lead(f"{look}." if look else "", noted(profile))
     page.key_figures(
         [
             KeyFigure(f"{keeping.mean:+.2f} m", f"mean offset: {side_of(keeping.mean)} of the lane centre"),

@@ -185,17 +185,20 @@ def comparison_page(compared: Compared) -> str:
     alike = "; ".join(", ".join(group) for group in compared.groups if len(group) > 1)
     pairs = _pairs(compared)
     apart = sum(row["verdict"].startswith("differ") for row in pairs)
-    page.lead(f"{apart} of {len(pairs)} pairs are told apart{f'; alike: {alike}' if alike else ''}.")
-    page.section("Which differ")
-    page.table([_nowrap(row) for row in pairs])
-    note = _distance_note(compared)
-    page.text(f"{note[0].upper()}{note[1:]}.", *(f"{words}." for words in looks_of(compared)))
+    finding = f"{apart} of {len(pairs)} pairs are told apart"
+    if len(pairs) == 1:
+        finding = f"{pairs[0]['profiles'].replace(', ', ' and ')}: {pairs[0]['verdict']}"
+    page.lead(f"{finding}{f'; alike: {alike}' if alike else ''}.")
     more = f"; {len(names) - MAXIMUM_DRAWN} more are left out of the figure" if len(names) > MAXIMUM_DRAWN else ""
     page.figure(
         comparison_figure(compared),
         f"Distribution of the offset, power spectral density and a sample path of each profile{more}.",
         "Densities, spectra and sample paths of the profiles",
     )
+    page.section("Which differ")
+    page.table([_nowrap(row) for row in pairs])
+    note = _distance_note(compared)
+    page.text(f"{note[0].upper()}{note[1:]}.", *(f"{words}." for words in looks_of(compared)))
     page.section("Summary")
     page.table([_nowrap(_row(each)) for each in compared.profiles], FIGURES_NOTE.replace("+-", "±"))
     return page.html(

@@ -267,3 +267,12 @@ def test_a_profile_keeps_driver_and_sensor_apart_and_samples_either(tmp_path, ca
         rough[len(words)] = np.diff(pd.read_csv(out).offset, 2).std() / STEP**2
     assert rough[2] > 4 * rough[0]
     assert rough[0] < 0.3, "m/s2 rms; this driver's own"
+
+
+def test_movement_like_no_traffic_is_the_sensors_only_where_it_could_not_be_told_apart(truth):
+    _, runs = split(truth, noises(truth, 600.0, "white"))
+    profile = replace(fit_runs([made_run(run) for run in runs], name="jittery", model="two-level"), sensor=None)
+    told, untold = SensorModel(1e-5, driver_share=(0.98, 1.0)), SensorModel(1e-5)
+    for sensor, is_told in ((None, True), (untold, True), (told, False)):
+        lines = fit_warnings(replace(profile, sensor=sensor))
+        assert any("check the sensor" in line for line in lines) is is_told

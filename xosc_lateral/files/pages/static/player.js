@@ -81,7 +81,7 @@
       this.marks = scene.marks.map((each) => shape(each, false));
       this.followed = this.vehicles.find((each) => each.enriched) ?? this.vehicles[0] ?? null;
       Object.assign(this, { stretch: 1, scale: 0, center: [0, 0], course: 0, playing: false, speed: 1, showGhosts: true, boxes: [] });
-      [this.across, this.start] = [scene.across, scene.start]; // its clock may be a recording's
+      [this.across, this.start, this.titles] = [scene.across, scene.start, scene.views]; // its clock may be a recording's
       this.sideBySide = this.vehicles.some((each) => each.enriched);
       clock.end = Math.max(clock.end, (scene.frames - 1) * scene.step);
       this.build();
@@ -245,7 +245,7 @@
       context.fillRect(0, 0, this.width, this.height);
       this.boxes = [];
       const high = this.height / this.views;
-      const views = this.sideBySide ? [["As written", "nominal"], ["Lifelike", "drawn"]] : [["", "drawn"]];
+      const views = this.sideBySide ? [[this.titles[0], "nominal"], [this.titles[1], "drawn"]] : [["", "drawn"]];
       views.forEach(([title, path], k) => {
         this.middle = (k + 0.5) * high;
         this.aim();
