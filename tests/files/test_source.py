@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,13 @@ def test_a_zero_byte_in_a_name_is_one_line_too() -> None:
 def test_a_file_above_the_limit_is_refused_with_both_sizes(table: Path) -> None:
     with pytest.raises(FormatError, match=r"drive\.csv: size of a file: 2e-05 MB, at most 1e-05 MB"):
         read_source(table, Limit(1e-5, "MB", "size of a file", "memory"))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="files of Linux' kernel")
+def test_a_file_of_the_kernel_that_says_it_is_empty_counts_by_what_it_holds() -> None:
+    assert os.stat("/proc/self/status").st_size == 0 and b"VmRSS" in read_source("/proc/self/status").data
+    with pytest.raises(FormatError, match="size of a file: 1.1e-05 MB, at most 1e-05 MB"):
+        read_source("/proc/self/status", Limit(1e-5, "MB", "size of a file", "memory"))
 
 
 @pytest.mark.parametrize(
