@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.motion.path_pieces import RowStretch, cut_path, vertex_times
+from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, RowStretch, cut_path, vertex_times
 
 STEP = 0.02
 FloatArray = NDArray[np.float64]
@@ -100,6 +100,17 @@ def test_a_sudden_change_of_speed_gets_a_vertex() -> None:
     _, spacing, error = checked(x, piece)
     assert spacing >= 0.1
     assert error < 0.02
+
+
+@pytest.mark.parametrize("pace", [10.0, 30.0])
+def test_a_car_that_creeps_its_last_centimetres_is_off_by_what_a_vertex_can_not_be_nearer_to_the_end(
+    pace: float,
+) -> None:
+    """From 10 or 30 m/s it creeps 6 cm: the last vertex is 10.5 cm before the end, 4.5 cm before it creeps."""
+    x = driven(np.append(np.full(100, pace), np.full(76, 0.04)))
+    (piece,) = pieces(x)
+    creeps = x[-1] - x[99]
+    assert checked(x, piece)[2] == pytest.approx(VERTEX_SPACING - creeps, abs=0.002)
 
 
 def test_a_start_in_the_second_row_is_not_smeared_over_the_first() -> None:
