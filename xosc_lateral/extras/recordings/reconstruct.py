@@ -27,6 +27,7 @@ from xosc_lateral.base.segment import MINIMUM_SPEED
 from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.evaluation.metrics import free_runs
+from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.recordings.encounters import encounters, relative_triggers
 from xosc_lateral.extras.recordings.lane_order import RoadLanes
@@ -179,21 +180,21 @@ def chosen(
     return tracks, begin, end
 
 
-WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]
+STEP = 0.2  # of rows, as in profiles [s]
 MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
 FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
 LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
 
 
 def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
+    """Stretches of road-following of `SNIPPET` and more: time [s], offset and lane width [m] every `STEP`."""
     residuals = plan.residuals
     time, width = residuals.time, plan.vehicle.lane_width[-len(residuals.time) :]
     following = plan.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
     parts = []
     for part in true_slices(following):
         even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
-        if len(even) * STEP > WINDOW:
+        if len(even) * STEP > SNIPPET:
             across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.columns["across"], width))
             parts.append((even, across, wide))
     return parts
@@ -204,7 +205,7 @@ def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowMo
     seen = [_summaries(_windows(offset)) for offset in stretches]
     seconds = STEP * sum(map(len, stretches))
     if not seen:
-        return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
+        return ChosenDriver("", seconds, 0.0, f"no {SNIPPET:g} s of road-following in one piece")
     windows = np.concatenate(seen)
     gains = {
         name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
@@ -246,7 +247,7 @@ class WindowModel:
 
 
 def _windows(offset: FloatArray) -> FloatArray:
-    length = round(WINDOW / STEP)
+    length = round(SNIPPET / STEP)
     return offset[: len(offset) // length * length].reshape(-1, length)
 
 

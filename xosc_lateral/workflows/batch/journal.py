@@ -54,8 +54,8 @@ def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
 
 
 RUN_DIGITS, MOST_RUNS = 12, 1000
-"""Hexadecimal digits of a run's id; ids that a lock keeps: nobody is killed so often one after another, and a forged lock
-can't grow from run to run."""
+"""Hexadecimal digits of a run's id; ids that a lock keeps: nobody is killed so often one after another, and what a lock
+says can't grow from run to run."""
 
 
 def _stated(file: IO[bytes]) -> dict[str, Any]:
