@@ -9,7 +9,7 @@ import pytest
 
 from tests.kit.motion import RADIUS, drive, entity, two_roads
 from tests.kit.places import hand_written
-from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
+from xosc_lateral.world.motion.nominal import Activity, EntityMotion, made_vehicle
 from xosc_lateral.world.motion.way import Way, way_of
 
 ACROSS = 5.25
@@ -39,6 +39,14 @@ def test_a_way_leads_through_the_places_driven_and_on_to_where_the_lane_ends(way
 def test_a_way_that_is_long_enough_has_no_end(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     assert not way_of(drive(network, entity(), start=350.0), network, 400.0, has_route=False).breaks
+
+
+def test_who_is_put_into_another_lane_begins_anew_there_and_who_is_found_there_has_lost_his(tmp_path: Path) -> None:
+    network, row = two_roads(tmp_path), np.arange(501)
+    for bits, why in ((Activity.TELEPORTED, []), (Activity.ACTIVE, ["the lane ends"])):
+        activity = np.where(row == 250, int(Activity.ACTIVE | bits), int(Activity.ACTIVE)).astype(np.uint8)
+        motion = drive(network, entity(), activity=activity).having(lane=np.where(row < 250, -2, -3).astype(np.int32))
+        assert [one.why for one in way_of(motion, network, 0.0, has_route=False).breaks] == why
 
 
 @pytest.mark.parametrize("aside", [0.4, -0.3])
