@@ -202,7 +202,7 @@ def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, Flo
 
 def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
     """The likeliest profile of offsets in lane [m], every `STEP`."""
-    seen = [_summaries(_windows(offset)) for offset in stretches]
+    seen = [_summaries(offset) for offset in stretches]
     seconds = STEP * sum(map(len, stretches))
     if not seen:
         return ChosenDriver("", seconds, 0.0, f"no {SNIPPET:g} s of road-following in one piece")
@@ -231,7 +231,7 @@ class WindowModel:
         """From free runs."""
         every = max(1, round(STEP / profile.model.step))
         runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
-        each = [_summaries(_windows(run)) for run in runs]
+        each = [_summaries(run) for run in runs]
         means = np.array([windows.mean(axis=0) for windows in each])
         within = np.mean([np.cov(windows.T) for windows in each], axis=0)
         between = np.cov(means.T) - within / len(each[0])
@@ -246,13 +246,10 @@ class WindowModel:
         return float(-0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(covariance)[1]))
 
 
-def _windows(offset: FloatArray) -> FloatArray:
+def _summaries(offset: FloatArray) -> FloatArray:
+    """Mean, log spread, log lateral speed of each window of offsets [m], every `STEP`, shape (n,); shape (k, 3)."""
     length = round(SNIPPET / STEP)
-    return offset[: len(offset) // length * length].reshape(-1, length)
-
-
-def _summaries(windows: FloatArray) -> FloatArray:
-    """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
+    windows = offset[: len(offset) // length * length].reshape(-1, length)
     spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
     speed = np.sqrt((rate(windows, STEP, past=True)[:, 1:] ** 2).mean(axis=1))
     return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])
