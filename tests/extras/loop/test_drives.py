@@ -50,6 +50,7 @@ def test_a_slope_that_all_drives_have_is_tested_by_how_they_scatter() -> None:
     error = np.sqrt((PRIOR_DRIVES * 2.0 + 2.0) / (PRIOR_DRIVES + 2.0) / 3.0)
     assert (pooled.size, pooled.error) == (pytest.approx(2.0), pytest.approx(error))
     assert pooled.p_value == pytest.approx(2.0 * stats.t.sf(2.0 / error, PRIOR_DRIVES + 2.0))
+    assert pooled.within == pytest.approx(stats.f.sf((1.0 + 4.0 + 9.0) / 3.0 / 2.0, 3, PRIOR_DRIVES))
 
 
 def test_two_drives_do_not_say_whether_drives_change_alike() -> None:

@@ -264,6 +264,7 @@ def test_an_output_and_a_folder_are_made_again_elsewhere(copy: Path, capsys: pyt
     assert main(["reproduce", str(output), "-o", str(output), "--force"]) == 1
 
 
+@pytest.mark.pages
 def test_outputs_whose_scenarios_can_not_be_played_any_more_are_named_with_the_error(copy: Path) -> None:
     for scenario in (copy / "in").rglob("*.xosc"):
         change(scenario, "</OpenSCENARIO>", "")
