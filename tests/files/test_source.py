@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from xosc_lateral.base.limits import PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNAS
 from xosc_lateral.files import source
 from xosc_lateral.files.source import (
     edit_in_place,
+    file_hash,
     guard_input,
     guarding_inputs,
     last_read,
@@ -83,6 +85,22 @@ def test_a_zero_byte_in_a_name_is_one_line_too() -> None:
 def test_a_file_above_the_limit_is_refused_with_both_sizes(table: Path) -> None:
     with pytest.raises(FormatError, match=r"drive\.csv: size of a file: 2e-05 MB, at most 1e-05 MB"):
         read_source(table, Limit(1e-5, "MB", "size of a file", "memory"))
+
+
+def test_a_file_above_the_limit_is_not_hashed(table: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(source, "FILE_SIZE", Limit(1e-6 * len(DATA), "MB", "size of a file", "memory"))
+    assert file_hash(table) == hashlib.sha256(DATA).hexdigest()
+    table.write_bytes(DATA + b"00")
+    with pytest.raises(FormatError, match=r"size of a file: 2\.2e-05 MB, at most 2e-05 MB"):
+        file_hash(table)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="files of Linux' kernel")
+def test_a_file_of_the_kernel_that_says_it_is_empty_counts_by_what_it_holds() -> None:
+    path = Path("/proc/self/status")
+    assert path.stat().st_size == 0 and b"VmRSS" in read_source(path).data
+    with pytest.raises(FormatError, match=r"size of a file: 1\.1e-05 MB, at most 1e-05 MB"):
+        read_source(path, Limit(1e-5, "MB", "size of a file", "memory"))
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,8 @@ def test_sizes_and_the_same_vehicle_twice_are_named() -> None:
     assert of_sizes(long, wide) is None
     assert "exchanged" in (of_sizes(wide, long) or "")
     assert "length=COLUMN:cm" in (of_sizes(100.0 * long, None) or "")
+    unknown = np.where(np.arange(9) < 6, 0.0, long)  # a length of zero is none: nothing is wider than that
+    assert of_sizes(unknown, wide) is None and of_sizes(np.zeros(9), wide) is None
     time = np.tile(np.arange(0.0, 10.0, 0.1), 3)
     vehicle, zero = np.repeat([0, 1, 2], 100), np.zeros(300)
     x = 30.0 * time + np.where(vehicle == 1, 0.5, 0.0)

@@ -11,7 +11,7 @@ from xosc_lateral.drivers.model.effects import Acts, Factor, Linear, Product
 from xosc_lateral.drivers.model.effects.response import respond
 from xosc_lateral.extras.loop.columns import Column, Values
 from xosc_lateral.extras.loop.dictionary import Search
-from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, regress, slope_alike, slopes_where_it_acts
+from xosc_lateral.extras.loop.drives import PRIOR_DRIVES, own_slopes, regress, slope_alike, slopes_where_it_acts
 from xosc_lateral.extras.loop.model import Fitted, fit_model
 from xosc_lateral.extras.loop.selection import BY_PRODUCT, ERROR_BUDGET, Accepted, Selection, select
 from xosc_lateral.extras.loop.shown import Shown, what_drives_show
@@ -50,6 +50,7 @@ def test_a_slope_that_all_drives_have_is_tested_by_how_they_scatter() -> None:
     error = np.sqrt((PRIOR_DRIVES * 2.0 + 2.0) / (PRIOR_DRIVES + 2.0) / 3.0)
     assert (pooled.size, pooled.error) == (pytest.approx(2.0), pytest.approx(error))
     assert pooled.p_value == pytest.approx(2.0 * stats.t.sf(2.0 / error, PRIOR_DRIVES + 2.0))
+    assert pooled.within == pytest.approx(stats.f.sf((1.0 + 4.0 + 9.0) / 3.0 / 2.0, 3, PRIOR_DRIVES))
 
 
 def test_two_drives_do_not_say_whether_drives_change_alike() -> None:
@@ -261,6 +262,14 @@ def test_drives_that_are_all_alike_are_not_said_to_differ() -> None:
     for seed in range(8):
         own = term.own_slopes(fit_model(some_drives(20 + seed, np.full(6, 0.15), 180.0), (term,)))
         assert own is not None and own.p_value > 1e-3
+
+
+def test_where_nothing_surely_acts_no_drive_is_named_and_the_size_is_that_of_all() -> None:
+    coarse, rng = some_drives(8, np.zeros(4), 240.0), np.random.default_rng(9)
+    rows, path = rng.normal(size=(2, len(coarse)))
+    own = own_slopes(rows, path, coarse)
+    assert own is not None and not own.differ
+    assert (own.there, own.size_there, own.error_there) == ((), 1.0, 0.0)
 
 
 def test_a_column_comes_back_where_the_product_that_stood_for_it_goes() -> None:

@@ -126,8 +126,13 @@ def test_a_course_does_what_its_fit_says_whatever_the_shape(coarse: Coarse, shap
     offset = planted + 0.3 * movement(np.random.default_rng(72), len(planted) * STEP)
     drives = coarse_of(offset, timeline.context, drives=2)
     term = CourseTerm.over_time(shape, mix)
-    (effect,) = term.estimate(fit_model(drives, (term,)))
+    fitted = fit_model(drives, (term,))
+    (effect,) = term.estimate(fitted)
     assert isinstance(effect, SingleColumnEffect)
+    told = term.describe(fitted, (effect,), "x")  # weights are as sure as what they do in a typical passage
+    np.testing.assert_allclose(
+        np.divide(effect.errors, np.abs(effect.coefficients)), told.size_error / abs(told.size_m)
+    )
     inside = timeline.valid
     assert np.corrcoef(drives.strength(effect)[inside], planted[inside])[0, 1] > 0.9
 

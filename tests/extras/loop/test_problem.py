@@ -37,12 +37,14 @@ def test_squares_that_come_in_clusters_are_made_white(coarse: Coarse) -> None:
     assert abs(related) < 4.0 / np.sqrt(len(rows))
 
 
-def test_what_a_column_explains_is_no_cluster(coarse: Coarse) -> None:
-    """A slow column in the squares looks like memory unless it is among the columns known."""
-    slow = np.sin(2.0 * np.pi * np.arange(len(coarse)) / 300.0)
-    squares = np.where(coarse.valid, 2.0 * slow + np.random.default_rng(3).normal(size=len(coarse)), 0.0)
-    unknown = of_squares(coarse, Squares(squares, coarse.valid), np.zeros((len(coarse), 0)))
-    known = of_squares(coarse, Squares(squares, coarse.valid), slow[:, None])
+def test_what_columns_explain_is_no_cluster(coarse: Coarse) -> None:
+    """Slow columns in the squares, wherever their zero is, look like memory unless they are among the columns known."""
+    slow = 2.0 * np.pi * np.arange(len(coarse)) / 300.0
+    columns = np.column_stack([np.sin(slow), 50.0 + np.cos(slow)])
+    noise = np.random.default_rng(3).normal(size=len(coarse))
+    squares = np.where(coarse.valid, columns @ [2.0, 1.0] - 50.0 + noise, 0.0)
+    unknown = of_squares(coarse, Squares(squares, coarse.valid), columns[:, :0])
+    known = of_squares(coarse, Squares(squares, coarse.valid), columns)
     told = [abs(problem.whitener.process.lags[-1]).sum() for problem in (unknown, known)]
     assert told[1] < 0.5 * told[0]
 

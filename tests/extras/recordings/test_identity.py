@@ -107,6 +107,7 @@ def test_tables_of_drives_are_split_and_counted_at_every_door(tmp_path: Path) ->
     assert set(imported.table["drive"]) == {"day", "day#2"}
     rows = {"kept": 2 * len(time) - 10, "repeated time": 50, "no place in a lane": 10}
     assert imported.provenance.rows == rows
+    assert imported.provenance.hours == 0.033  # 2390 rows of 0.05 s are 119.5 s
     imported.write(tmp_path / "again.parquet")
     drives = read_drives(tmp_path / "again.parquet")
     assert [(drive.name, len(drive)) for drive in drives] == [("day", len(time) - 10), ("day#2", len(time))]

@@ -157,7 +157,7 @@ def test_exact_paths_are_the_recorded_ones(tracks, road, tmp_path):
 
 def test_parts_are_chosen_by_time_and_by_company(tracks, road):
     part = xl.reconstruct(tracks, road=road, columns=COLUMNS, begin=10, end=25)
-    assert part.to_dict()["window"] == [10, 25]
+    assert part.to_dict()["window"] == [10, 25] and part.to_dict()["summary"]["duration"] == 15.0
     near = xl.reconstruct(tracks, road=road, columns=COLUMNS, around="A", window=20)
     assert {row["entity"] for row in near.to_dict()["vehicles"]} == {"A", "B", "C"}  # C passes on the other side
     assert near.to_dict()["window"][1] - near.to_dict()["window"][0] == pytest.approx(20.0, abs=0.1)

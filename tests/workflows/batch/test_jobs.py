@@ -13,7 +13,7 @@ import pytest
 from xosc_lateral.base.errors import DriverProfileError, FormatError
 from xosc_lateral.files.openscenario.write.draft import Player
 from xosc_lateral.files.profiles import SHIPPED
-from xosc_lateral.workflows.batch.jobs import Batch, plan_batch
+from xosc_lateral.workflows.batch.jobs import Batch, _rounded, plan_batch
 from xosc_lateral.workflows.batch.request import DocumentKind, Request, document_kind
 from xosc_lateral.workflows.conversion.settings import ConvertSettings
 
@@ -103,6 +103,7 @@ def test_variants_are_numbered_and_their_fingerprints_differ(database: Path, tmp
     batch = plan_batch([database / "z.XOSC"], tmp_path / "out", variants=3)
     assert names(batch) == ["z_01.XOSC", "z_02.XOSC", "z_03.XOSC"]
     assert [job.variant for job in batch.jobs] == [0, 1, 2]
+    assert not any(job.labels or job.page for job in batch.jobs), "unless asked for"
     assert len({job.fingerprint for job in batch.jobs}) == 3
 
 
@@ -264,3 +265,7 @@ def test_cells_that_name_no_file_are_refused_in_a_line(database: Path, tmp_path:
         plan_batch([table], tmp_path / "out")
     table.write_text(f"scenario,profile\ndb/a/x.xosc,{'p' * 5000}\n")
     assert len(names(plan_batch([table], tmp_path / "out"))[0]) < 30  # the conversion says what is wrong
+
+
+def test_numbers_of_a_manifest_are_to_a_millionth() -> None:
+    assert (_rounded(1.23456749), _rounded(-0.00000051)) == (1.234567, -0.000001)

@@ -18,7 +18,7 @@ from xosc_lateral.base.errors import FormatError
 from xosc_lateral.base.limits import BATCH_JOBS
 from xosc_lateral.files.atomic import LARGEST_RECORD
 from xosc_lateral.workflows.batch import manifest
-from xosc_lateral.workflows.batch.journal import Journal, folder_lock
+from xosc_lateral.workflows.batch.journal import CLOCK_TICK, MOST_RUNS, Journal, _known, folder_lock
 from xosc_lateral.workflows.batch.manifest import (
     MANIFEST,
     ManifestRow,
@@ -88,6 +88,28 @@ def test_a_foreign_file_of_that_name_is_refused(tmp_path: Path) -> None:
         list(read_manifest(path))
 
 
+def test_what_an_older_program_did_not_know_of_an_output_counts_as_none() -> None:
+    """A row of its first columns alone; its variants count from 0."""
+    old = ("output", "scenario", "scenario_sha256", "variant", "seed", "profile", "parameters", "settings")
+    row = ManifestRow.from_dict({name: getattr(ROW, name) for name in (*old, "package_version")})
+    assert (row.variant, row.behaviour, row.player) == (ROW.variant + 1, 1, "standard")
+    counted = (row.entities, row.segment_seconds, row.offset_spread, row.trial_contacts, len(row.enriched))
+    assert counted == (0, 0.0, 0.0, 0, 0) and (row.gap_before, row.gap_after, row.only) == (None, None, None)
+    assert not (row.with_sensor or row.cut_off or row.stale or row.error or row.warnings or row.modes or row.options)
+
+
+@pytest.mark.parametrize(
+    ("changed", "written", "is_kept"),
+    [(0, 0, True), (CLOCK_TICK + 1, CLOCK_TICK + 1, True), (CLOCK_TICK, 0, False), (0, CLOCK_TICK, False)],
+)
+def test_a_state_is_kept_if_any_later_edit_would_change_it(changed: int, written: int, is_kept: bool) -> None:
+    """Of a file whose state or bytes changed `changed` and `written` ns ago; 0: long ago."""
+    now = 10**18
+    times = [now - ago if ago else 1 for ago in (changed, written)]
+    timing = Timing(2.0, f"17 {times[0]} {times[1]} 4711")
+    assert _known(timing, now) == (timing if is_kept else Timing(2.0))
+
+
 def test_timings_come_back(tmp_path: Path) -> None:
     written = {"a": Timing(0.5), "b": Timing(1.0, "1 2 3 4")}
     write_timings(written.items(), tmp_path / "t")
@@ -133,10 +155,10 @@ def test_a_line_of_a_journal_and_a_lock_have_so_many_bytes_and_no_more(tmp_path:
     with Journal(tmp_path / "out", path, print) as journal:
         assert not list(journal)
         journal.drop()
-    killed = [f"{number:012x}" for number in range(1500)]
+    killed = [f"{number:012x}" for number in range(2 * MOST_RUNS)]
     path.write_text(json.dumps({"runs": killed}))
     with folder_lock(path) as runs:
-        assert runs[1:] == killed[:999]
+        assert runs[1:] == killed[: MOST_RUNS - 1]
     path.write_text("{" + " " * LARGEST_RECORD + f'"runs": ["{killed[0]}"]}}')
     with folder_lock(path) as runs:
         assert not runs[1:]

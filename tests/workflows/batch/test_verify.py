@@ -264,6 +264,17 @@ def test_an_output_and_a_folder_are_made_again_elsewhere(copy: Path, capsys: pyt
     assert main(["reproduce", str(output), "-o", str(output), "--force"]) == 1
 
 
+@pytest.mark.pages
+def test_outputs_whose_scenarios_can_not_be_played_any_more_are_named_with_the_error(copy: Path) -> None:
+    for scenario in (copy / "in").rglob("*.xosc"):
+        change(scenario, "</OpenSCENARIO>", "")
+    result = xl.reproduce(copy / "out", copy / "again")
+    assert [one.output for one in result.failing] == sorted((copy / "out").rglob("*.xosc"))
+    for one in result.failing:
+        ((kind, why),) = one.problems
+        assert kind.value == "failed" and "cut-in.xosc" in why
+
+
 def test_a_manifest_that_names_files_elsewhere_is_refused(copy: Path) -> None:
     rows = pd.read_parquet(copy / "out" / MANIFEST)
     rows.loc[0, "output"] = "../../evil.xosc"

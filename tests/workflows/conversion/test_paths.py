@@ -11,7 +11,6 @@ import pytest
 import xosc_lateral as xl
 from tests.kit.made import reactive
 from tests.kit.made.roads import ROADS
-from tests.kit.places import hand_written
 from tests.kit.scenario_files import (
     entity,
     private,
@@ -27,8 +26,7 @@ from tests.world.scenario.test_under_test import at, event, headway, stories
 from xosc_lateral.workflows.conversion.ego_drives import BRAKING_RATE, Drive, drives, with_speeds
 from xosc_lateral.workflows.conversion.load import play_scenario
 from xosc_lateral.world.motion.look import look_at, moving
-from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
-from xosc_lateral.world.motion.way import way_of
+from xosc_lateral.world.motion.nominal import EntityMotion
 from xosc_lateral.world.player.player import play
 
 ROUTE = (
@@ -79,23 +77,6 @@ def test_an_ego_of_the_check_stops_so_that_others_would_stand_at_a_joint(turning
     assert (slow[0][1], fast[0][1], to) == (0.7, 1.3, 0.0) and later > braking + 18.0 / BRAKING_RATE
     assert np.abs(joints - braking - 0.5 * 18.0 / BRAKING_RATE).min() < 1e-9
     assert drives(motion, [], played.network) == (Drive(),)
-
-
-def test_a_way_ends_where_s_turns_round_and_goes_on_behind() -> None:
-    """On a ring of two roads that are drawn against each other, on and on."""
-    network = hand_written("ring")
-    time = np.arange(0.0, 10.0, 0.1)
-    rows = {name: np.zeros(len(time)) for name in ("y", "offset", "heading_relative", "speed")}
-    road, lane = np.zeros(len(time), dtype=np.int32), np.full(len(time), -1, dtype=np.int32)
-    rows |= {"x": 20.0 * time, "s": 20.0 * time, "road": road, "lane": lane}
-    activity = np.ones(len(time), dtype=np.uint8)
-    motion = EntityMotion.of(made_vehicle("T", 4.8, 1.9, 1.4), time, **rows, activity=activity)
-    way = way_of(motion, network, 700.0, has_route=False)
-    assert [one.why for one in way.breaks] == ["s runs the other way"] * 2
-    first = way.breaks[0]
-    assert first.distance == pytest.approx(314.2, abs=5.0) and first.place.road == "a"
-    assert first.lanes[0].road == "b" and first.side == -1.0 and way.side_at(400.0) == -1.0
-    assert way.span_at(400.0) == pytest.approx((314.2, 628.3), abs=5.0)
 
 
 TIED = (

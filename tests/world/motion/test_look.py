@@ -10,7 +10,7 @@ import pytest
 from tests.kit.motion import drive, entity, two_roads
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.track import Track
-from xosc_lateral.world.motion.look import compare_tracks, rests_beside
+from xosc_lateral.world.motion.look import _Both, compare_tracks, rests_beside
 
 STEP = 0.02
 TIME = STEP * np.arange(1000)
@@ -90,3 +90,11 @@ def test_who_rests_beside_the_middle_is_told_from_when_on(tmp_path: Path) -> Non
     )
     (found,) = rests_beside(drives.having(offset=held))
     assert found.size == pytest.approx(0.75, abs=0.05) and found.time == pytest.approx(0.25 * drives.time[-1], abs=1.0)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.02, 0.1, 0.3, 30.0])
+def test_the_largest_around_is_that_of_all_rows_within_a_time(time: float) -> None:
+    both, values = _Both(track(EVEN, NONE), track(EVEN, NONE)), np.random.default_rng(4).normal(size=len(TIME))
+    reach = round(time / STEP)
+    expected = [values[max(k - reach, 0) : k + reach + 1].max() for k in range(len(values))]
+    np.testing.assert_array_equal(both.around(values, time), expected)

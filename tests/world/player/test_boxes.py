@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from xosc_lateral.world.motion.gaps import box_distance
@@ -49,9 +49,13 @@ def test_corners_go_round_from_front_left() -> None:
     assert np.array(turned) == pytest.approx(np.array(((9.0, 8.4), (9.0, 4.4), (11.0, 4.4), (11.0, 8.4))))
 
 
-@given(st.floats(-20, 20), st.floats(-20, 20), st.floats(-4, 4), st.floats(-4, 4))
-def test_boxes_overlap_when_their_exact_distance_is_nothing(x: float, y: float, own: float, its: float) -> None:
-    a, b = car(heading=own), car(x, y, its)
+@given(st.floats(-20, 20), st.floats(-20, 20), st.floats(-4, 4), st.floats(-4, 4), st.sampled_from([1.4, -7.0]))
+@example(17.0, 0.0, pi, 0.0, -7.0).via("two semitrailers by their kingpins, rear to rear: they reach 9 m each")
+def test_boxes_overlap_when_their_exact_distance_is_nothing(
+    x: float, y: float, own: float, its: float, centre: float
+) -> None:
+    """About rear axles, and about a point that lies outside of the box."""
+    a, b = car(heading=own, centre=centre), car(x, y, its, centre=centre)
     apart = float(box_distance(np.array([corners(a)]), np.array([corners(b)]))[0])
     if apart == 0.0 or apart > 1e-3:  # in between, the player's tolerance decides
         assert overlap(a, b) is (apart == 0.0)

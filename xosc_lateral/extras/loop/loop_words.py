@@ -306,7 +306,7 @@ def shown_words(shown: Sequence[Shown]) -> str:
         sizes = sorted(one.smallest for one in shown if one.acts == acts and one.smallest is not None)
         words += [form.format(sizes[len(sizes) // 2])] if sizes else []
     short = next((one.why for one in shown if one.what == "time" and not one.tested), None)
-    untaken = "" if short is None else f" Changes with time, as a driver settles or tires, were not looked for: {short}."
+    untaken = f" Changes with time, as a driver settles or tires, were not looked for: {short}." if short else ""
     if not words:
         return f"In these drives no effect of a column would be found.{untaken}"
     changes = f"Four of five changes {' or '.join(words)} would be found in these drives"

@@ -26,6 +26,7 @@ from xosc_lateral.base.texts import composed
 from xosc_lateral.drivers.drives.drive import Drive
 from xosc_lateral.drivers.drives.lane_changes import SETTLED_OFFSET
 from xosc_lateral.drivers.evaluation.metrics import free_runs
+from xosc_lateral.drivers.evaluation.scores import SNIPPET
 from xosc_lateral.drivers.fitting.maneuvers import SIDES, MeasuredChanges, fit_maneuvers
 from xosc_lateral.drivers.model.profile import BEFORE_STEP, DriverProfile, Maneuvers
 from xosc_lateral.extras.recordings.encounters import encounters, relative_triggers
@@ -180,21 +181,21 @@ def chosen(
     return tracks, begin, end
 
 
-WINDOW, STEP = 10.0, 0.2  # of movement that is summed up, as the evaluation's snippets; of rows, as in profiles [s]
+STEP = 0.2  # of rows, as in profiles [s]
 MINIMUM_LOG_ODDS = 2.0  # another profile than the population's has to be likelier by this: weights of 7 to 1 [nat]
 FREE_RUNS = 40  # of each profile, five minutes each: 30 windows of 40 drivers
 LEAST_SPREAD = 1e-4  # of a path in a window, below which its logarithm would say something about digits [m]
 
 
 def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Stretches of road-following of `WINDOW` and more: time [s], offset and lane width [m] every `STEP`."""
+    """Stretches of road-following of `SNIPPET` and more: time [s], offset and lane width [m] every `STEP`."""
     residuals = plan.residuals
     time, width = residuals.time, plan.vehicle.lane_width[-len(residuals.time) :]
     following = plan.in_lane & (plan.speed.at(time) >= MINIMUM_SPEED)
     parts = []
     for part in true_slices(following):
         even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
-        if len(even) * STEP > WINDOW:
+        if len(even) * STEP > SNIPPET:
             across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.columns["across"], width))
             parts.append((even, across, wide))
     return parts
@@ -202,10 +203,10 @@ def in_lane_offsets(plan: VehiclePlan) -> list[tuple[FloatArray, FloatArray, Flo
 
 def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
     """The likeliest profile of offsets in lane [m], every `STEP`."""
-    seen = [_summaries(_windows(offset)) for offset in stretches]
+    seen = [_summaries(offset) for offset in stretches]
     seconds = STEP * sum(map(len, stretches))
     if not seen:
-        return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
+        return ChosenDriver("", seconds, 0.0, f"no {SNIPPET:g} s of road-following in one piece")
     windows = np.concatenate(seen)
     gains = {
         name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
@@ -231,7 +232,7 @@ class WindowModel:
         """From free runs."""
         every = max(1, round(STEP / profile.model.step))
         runs = free_runs(profile, seed, drivers=FREE_RUNS)[:, ::every]
-        each = [_summaries(_windows(run)) for run in runs]
+        each = [_summaries(run) for run in runs]
         means = np.array([windows.mean(axis=0) for windows in each])
         within = np.mean([np.cov(windows.T) for windows in each], axis=0)
         between = np.cov(means.T) - within / len(each[0])
@@ -246,13 +247,10 @@ class WindowModel:
         return float(-0.5 * (away @ np.linalg.solve(covariance, away) + np.linalg.slogdet(covariance)[1]))
 
 
-def _windows(offset: FloatArray) -> FloatArray:
-    length = round(WINDOW / STEP)
-    return offset[: len(offset) // length * length].reshape(-1, length)
-
-
-def _summaries(windows: FloatArray) -> FloatArray:
-    """Mean, log spread, log lateral speed of each window, shape (k, 3)."""
+def _summaries(offset: FloatArray) -> FloatArray:
+    """Mean, log spread, log lateral speed of each window of offsets [m], every `STEP`, shape (n,); shape (k, 3)."""
+    length = round(SNIPPET / STEP)
+    windows = offset[: len(offset) // length * length].reshape(-1, length)
     spread = np.maximum(windows.std(axis=1), LEAST_SPREAD)
     speed = np.sqrt((rate(windows, STEP, past=True)[:, 1:] ** 2).mean(axis=1))
     return np.column_stack([windows.mean(axis=1), np.log(spread), np.log(np.maximum(speed, LEAST_SPREAD))])

@@ -42,7 +42,7 @@ def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
     try:
         killed = stated if isinstance(stated := _stated(file).get("runs"), list) else []
         killed = [run for run in map(str, killed) if re.fullmatch(rf"[0-9a-f]{{{RUN_DIGITS}}}", run)]
-        runs = [secrets.token_hex(RUN_DIGITS // 2), *killed][:1000]  # nobody was killed so often one after another
+        runs = [secrets.token_hex(RUN_DIGITS // 2), *killed][:MOST_RUNS]
         file.seek(0)
         file.truncate()
         file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname(), "runs": runs}).encode())
@@ -53,8 +53,9 @@ def folder_lock(path: Path, wait: float = 0.0) -> Iterator[Sequence[str]]:
         file.close()
 
 
-RUN_DIGITS = 12
-"""Hexadecimal digits of a run's id."""
+RUN_DIGITS, MOST_RUNS = 12, 1000
+"""Hexadecimal digits of a run's id; ids that a lock keeps: nobody is killed so often one after another, and what a lock
+says can't grow from run to run."""
 
 
 def _stated(file: IO[bytes]) -> dict[str, Any]:

@@ -362,9 +362,7 @@ def axis_gap(corners_: tuple[Point, ...], other: tuple[Point, ...], axis: Point)
 def overlap(a: EntityState, b: EntityState) -> bool:
     """Whether the boxes touch (separating axes), on the same level."""
     pa, pb = a.plane, b.plane
-    box_a, box_b = a.entity.bounding_box, b.entity.bounding_box
-    reach = hypot(box_a.length + box_b.length, box_a.width + box_b.width)
-    if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
+    if hypot(pb.x - pa.x, pb.y - pa.y) > _reach(a) + _reach(b) or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
         return False
     first, other = corners(a), corners(b)
     return not any(any(box_gaps(first, other, -heading)) for heading in (pa.heading, pb.heading))

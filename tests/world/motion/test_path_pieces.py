@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from xosc_lateral.world.motion.nominal import Activity
-from xosc_lateral.world.motion.path_pieces import RowStretch, cut_path, vertex_times
+from xosc_lateral.world.motion.path_pieces import VERTEX_SPACING, RowStretch, cut_path, vertex_times
 
 STEP = 0.02
 FloatArray = NDArray[np.float64]
@@ -102,6 +102,17 @@ def test_a_sudden_change_of_speed_gets_a_vertex() -> None:
     assert error < 0.02
 
 
+@pytest.mark.parametrize("pace", [10.0, 30.0])
+def test_a_car_that_creeps_its_last_centimetres_is_off_by_what_a_vertex_can_not_be_nearer_to_the_end(
+    pace: float,
+) -> None:
+    """From 10 or 30 m/s it creeps 6 cm: the last vertex is 10.5 cm before the end, 4.5 cm before it creeps."""
+    x = driven(np.append(np.full(100, pace), np.full(76, 0.04)))
+    (piece,) = pieces(x)
+    creeps = x[-1] - x[99]
+    assert checked(x, piece)[2] == pytest.approx(VERTEX_SPACING - creeps, abs=0.002)
+
+
 def test_a_start_in_the_second_row_is_not_smeared_over_the_first() -> None:
     speed = np.full_like(TIME, 36.0)
     speed[1] = 0.0
@@ -128,6 +139,21 @@ def test_a_teleport_to_a_place_to_stand_at_is_a_move_of_one_row() -> None:
     assert pieces(x, teleported=teleported) == [RowStretch(100, 100, placed=True, stops=True)]
 
 
+def test_who_is_placed_drives_and_stops_has_one_move() -> None:
+    x = driven(np.where(TIME < 10.0, 10.0, 0.0))
+    teleported = np.zeros_like(x)
+    teleported[100] = 1
+    x[100:] += 500.0
+    _, second = pieces(x, teleported=teleported)
+    assert (second.first, second.placed, second.stops) == (100, True, True)
+    assert TIME[second.last] == pytest.approx(10.0, abs=2 * STEP)
+
+
+def test_who_is_there_for_the_first_row_alone_has_no_move() -> None:
+    x = driven(np.full_like(TIME, 10.0))
+    assert pieces(x, active=(np.arange(len(x)) < 1).astype(float)) == []
+
+
 def test_an_entity_that_is_added_later_is_placed() -> None:
     x = driven(np.full_like(TIME, 10.0))
     x[:200] = np.nan
@@ -150,3 +176,29 @@ def test_vertices_are_apart_in_the_plane_even_where_the_way_winds() -> None:
     gaps = np.hypot(np.diff(np.interp(times, time, x)), np.diff(np.interp(times, time, y)))
     assert gaps.min() >= 0.1
     assert (times[0], times[-1]) == (time[0], time[-1])
+
+
+def test_who_winds_on_the_spot_has_no_vertices_but_its_start() -> None:
+    """The circle of 4 cm alone: 0.25 m long, and no two places of it are 0.1 m apart."""
+    time = np.arange(0.0, 1.0, 0.02)
+    angle = 2.0 * np.pi * time
+    assert vertex_times(time, 0.04 * np.sin(angle), 0.04 * (1.0 - np.cos(angle))).tolist() == [0.0]
+
+
+def test_moves_and_vertices_of_long_runs_are_those_of_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows are taken in blocks, whose borders may lie anywhere: in a stop, in a turn, at a kink."""
+    speed = np.clip(8.0 * np.cos(0.35 * TIME), -3.0, 6.0) * (np.abs(TIME - 20.0) > 1.5)
+    way = driven(speed)
+    x, y = 30.0 * np.sin(way / 30.0), 30.0 * (1.0 - np.cos(way / 30.0))
+    activity = np.full(len(x), int(Activity.ACTIVE), dtype=np.uint8)
+
+    def made() -> list[tuple[RowStretch, list[float]]]:
+        parts = cut_path(TIME, x, y, activity)
+        rows = (slice(one.first, one.last + 1) for one in parts)
+        return [(one, vertex_times(TIME[k], x[k], y[k]).tolist()) for one, k in zip(parts, rows, strict=True)]
+
+    whole = made()
+    assert len(whole) > 3
+    for size in (97, 250):
+        monkeypatch.setattr("xosc_lateral.base.rows.BLOCK", size)
+        assert made() == [(one, pytest.approx(times, abs=1e-9)) for one, times in whole]
