@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from xosc_lateral.base.errors import XoscLateralError
+from xosc_lateral.base.grouping import grouped
 
 Row = tuple[Any, ...]
 """Of one vehicle at one time, by `call.TRACE_COLUMNS`."""
@@ -71,7 +72,5 @@ def later_actions(scenario: Path, spans: Spans, end: float) -> list[str]:
 
 def not_driven(why: Mapping[str, str]) -> list[str]:
     """Vehicles that had no driver of ours, by the reason for it: a line each."""
-    names: dict[str, list[str]] = {}
-    for name, reason in why.items():
-        names.setdefault(reason, []).append(repr(name))
+    names = grouped((reason, repr(name)) for name, reason in why.items())
     return [f"not driven, {reason}: {', '.join(sorted(who))}" for reason, who in names.items()]

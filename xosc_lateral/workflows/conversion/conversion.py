@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.plugins import service
 from xosc_lateral.base.texts import counted
@@ -50,10 +51,8 @@ class Conversion(ConvertedScenario, Result):
                 )
             elif entity.name not in self.egos:  # those are told
                 lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
-        alike: dict[str, list[str]] = {}
-        for entity in self.movement.entities:
-            if entity.is_enriched:
-                alike.setdefault(entity.beside(self.provenance.options["neighbours"]), []).append(entity.name)
+        neighbours = self.provenance.options["neighbours"]
+        alike = grouped((one.beside(neighbours), one.name) for one in self.movement.entities if one.is_enriched)
         lines += [
             f"  {', '.join(names)}, {words}"
             for words, names in alike.items()
