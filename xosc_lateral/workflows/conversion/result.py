@@ -60,6 +60,8 @@ _WANTED = {
 NOMINAL_RUN = "nominal"
 """Name of the run in which vehicles under test drive as written; others are named by what theirs do."""
 
+CONTACT_MOVED = 0.25
+"""By which a contact comes earlier or later without a word. [s]"""
 ROW_STEP = 0.1
 """Between rows that are drawn, and from which accelerations are taken. [s]"""
 
@@ -203,7 +205,7 @@ class Enriched:
         return len(self.new_contacts) + len(self.departures)
 
     def contact_notes(self) -> Iterator[Note]:
-        """Contacts that are new, and that are gone."""
+        """Contacts that are new, that are gone, and that come earlier or later."""
         for gaps, what in (
             (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
             (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
@@ -211,6 +213,12 @@ class Enriched:
             for gap in gaps:
                 both = "'{}' and '{}' ".format(*gap.names)
                 yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
+        touched = {gap.names: gap.time for gap in self.gaps_before if gap.touches}
+        for gap in self.gaps_after:
+            before = touched.get(gap.names, gap.time)
+            if gap.touches and abs(gap.time - before) > CONTACT_MOVED:
+                what = f"'{gap.names[0]}' and '{gap.names[1]}' touch at {gap.time:.1f} s instead of at {before:.1f} s"
+                yield Note(what, is_warning=True, run=NOMINAL_RUN)
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""
