@@ -39,7 +39,7 @@ TELLING = {
     "event starts": "happens|comes|shifts", "event ends": "is over|lasts", "event lost": "no longer happens",
     "event never ends": "is over|no longer", "event added": "is new|once more", "order changes": "comes before",
     "run ends": "the end", "contact": "contact|touch", "last lane": "last lane|drives onto", "elsewhere": "elsewhere",
-    "corner": "corner|turned across", "heading": "is turned", "creeps": "while it stands|is put|slides",
+    "corner": "corner|turned across", "heading": "is turned|corner", "creeps": "while it stands|is put|slides",
     "turns at rest": "turns",
     "swerves": "leaves its lane", "jumps": "is put|elsewhere|slides",
     "rests": "move sideways|times what was sampled|are none|stays as it is",
@@ -74,11 +74,12 @@ def told(finding, messages):
     for entity, text in messages:
         about = entity == finding["who"] or any(name in text for name in names)
         times = [float(one) for one in re.findall(r"(\d+(?:\.\d+)?) s\b", text)]
-        if about and re.search(DIFFERS, text) and min(times, default=0.0) <= finding["t"] + SAME_TIME:
+        is_other = finding.get("ego", "nominal") != "nominal"
+        if about and re.search(DIFFERS, text) and (is_other or min(times, default=0.0) <= finding["t"] + SAME_TIME):
             return True
         if not (about and words and re.search(words, text)):
             continue
-        if finding.get("ego", "nominal") != "nominal" or re.search("more run|of the time that", text):
+        if is_other or re.search("more run|of the time that", text):
             return True
         if any(abs(one - t) <= SAME_TIME for one in times for t in (finding["t"], finding.get("since", finding["t"]))):
             return True
@@ -193,11 +194,20 @@ def busy(spec, run, who, time):
     return rows
 
 
-def moves(spec, who, source, other, shifted, *, is_moved, replay=None, own=False):
+def placed(spec, run, who, time):
+    """Rows, from 1 on, into which a vehicle is put: `Track.breaks`."""
+    own = {
+        event["name"] for event in spec["events"] if event["of"] == who and "teleport" in {do[0] for do in event["do"]}
+    }
+    rows = {int(np.searchsorted(time, t + 1e-6)) for found in occurrences(run, own).values() for t in found}
+    return np.array(sorted(row + more for row in rows for more in (-1, 0) if 0 < row + more < len(time)), dtype=int)
+
+
+def moves(spec, who, source, other, shifted, *, breaks, is_moved, replay=None, own=False):
     """How a vehicle moves otherwise: kind, time, size; `own`: see `busy`; `replay`: its replay`s rows, when asked."""
     tracks = [
-        Track(who, rows[:, 0], dict(zip(("x", "y", "heading", "speed"), rows[:, 1:5].T, strict=True)), np.empty(0, int))
-        for rows in (source, other)
+        Track(who, rows[:, 0], dict(zip(("x", "y", "heading", "speed"), rows[:, 1:5].T, strict=True)), put)
+        for rows, put in zip((source, other), breaks, strict=True)
     ]  # fmt: skip
     if not is_moved:
         far = np.hypot(*(other - source)[:, 1:3].T)
@@ -270,7 +280,7 @@ def compares(spec, a, b, moved, there, replay=None):
         if len(source) < 50:
             continue
         again = (lambda name=who: replay(name)) if replay else None
-        own = busy(spec, a, who, source[:, 0])
-        found = moves(spec, who, source, other, shifted, is_moved=who in moved, replay=again, own=own)
+        own, breaks = busy(spec, a, who, source[:, 0]), [placed(spec, run, who, source[:, 0]) for run in (a, b)]
+        found = moves(spec, who, source, other, shifted, is_moved=who in moved, replay=again, own=own, breaks=breaks)
         out += [{"kind": kind, "who": who, "t": float(t), "size": float(size)} for kind, t, size in found]
     return [{**one, "context": context(spec, a, one["who"], one["t"])} for one in out]

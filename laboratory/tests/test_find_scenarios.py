@@ -11,7 +11,7 @@ import pytest
 
 from laboratory.find import player
 from laboratory.find.engine import Finding, shrink, spec_of
-from laboratory.find.judge import told
+from laboratory.find.judge import compares, told
 from laboratory.find.scenarios import Planted, Scenarios
 
 pytestmark = pytest.mark.pages
@@ -79,6 +79,30 @@ def test_a_message_that_is_removed_makes_a_finding_silent() -> None:
     for other in (line.replace("2.00", "5.00"), line.replace("happens 0.30 s later", "is new")):
         assert not told(finding, [("A", other)])
     assert not told(finding, [("B", line.replace("'A'", "'B'").replace("e0", "e1"))])
+
+
+def test_what_esmini_plays_otherwise_is_told_whenever_another_ego_brings_it_about() -> None:
+    finding = {"kind": "event added", "who": "D", "event": "e6", "t": 6.9}
+    line = "'D': road '2' has no lane 4: lane change not played (at 7.95 s)"
+    assert told({**finding, "ego": "1.2"}, [("D", line)])
+    assert not told({**finding, "ego": "nominal"}, [("D", line)])
+
+
+@pytest.mark.parametrize(("act", "kinds"), [("teleport", set()), ("speed", {"corner"})])
+def test_who_is_put_to_a_place_near_by_goes_round_no_corner(act: str, kinds: set[str]) -> None:
+    time = 0.01 * np.arange(1000)
+    rows = np.zeros((len(time), 9))
+    rows[:, 0], rows[:, 1], rows[:, 4] = time, 20.0 * time - 0.4 * (time > 5.0), 20.0
+    aside = rows.copy()
+    aside[:, 2] = aside[:, 7] = 0.2 * (time <= 5.0)
+    spec = {
+        "road": {"kind": "plain"}, "vehicles": [{"name": "A", "class": "car"}],
+        "events": [{"name": "e0", "of": "A", "do": [[act]], "when": []}],
+    }  # fmt: skip
+    states = [("e0", player.EVENT, player.RUNNING, 5.0), ("e0", player.EVENT, player.DONE, 5.0)]
+    runs = [{"rows": {"A": one}, "states": states, "contacts": {}, "end": 10.0} for one in (rows, aside)]
+    found = compares(spec, *runs, ["A"], ["e0"])
+    assert {one["kind"] for one in found} & {"corner", "heading", "elsewhere"} == kinds
 
 
 def test_a_bound_of_the_product_that_is_widened_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

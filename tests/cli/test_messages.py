@@ -93,3 +93,38 @@ def test_rows_that_are_left_out_are_told_where_a_table_is_used(folder, monkeypat
     drives = [one["what"] for one in values["messages"] if "rows left out" in one["what"]]
     assert drives and all(line in str(xl.sample("motorway", like="drive.csv")) for line in drives), text
     assert [str(one) for one in xl.evaluate("motorway", "drive.csv", classify=False).messages] == drives
+
+
+BENT = {
+    "the road after its own repair": (".xodr", '<width a="', '<width a="x', "geometry of length 0 m left out"),
+    "the scenario after a version": (".xosc", 'entityRef="Ego"', 'entityRef="Nobody"', "version 1.9 is read as 1.3"),
+    "the player after a version": (".xosc", 'laneId="-', 'laneId="-9', "version 1.9 is read as 1.3"),
+    "the player after a repair of the road": (".xosc", 'laneId="-', 'laneId="-9', "geometry of length 0 m left out"),
+    "a setting after a repair of the road": (".xosc", "", "", "geometry of length 0 m left out"),
+}
+"""Who refuses after what was remarked -> what is bent in which file, and the remark."""
+
+
+@pytest.mark.parametrize("case", BENT)
+def test_a_refusal_carries_what_was_remarked_before_it(case, folder, tmp_path, monkeypatch, capsys):
+    ending, whole, broken, remark = BENT[case]
+    for path in folder.glob("*.xo*"):
+        text = path.read_text().replace('revMajor="1" revMinor="2"', 'revMajor="1" revMinor="9"')
+        (tmp_path / path.name).write_text(text.replace(whole, broken, 1) if whole and path.suffix == ending else text)
+    monkeypatch.chdir(tmp_path)
+    words = [
+        "convert",
+        "cut-in.xosc",
+        "-o",
+        "out.xosc",
+        "--ego",
+        "none",
+        *(["--enrich", "Nobody"] if not whole else []),
+    ]
+    values, text = said(capsys, words, code=1)
+    (told,) = (one for one in values["error"]["messages"] if remark in one["what"])
+    assert told["severity"] == "note"
+    lines = text.splitlines()
+    assert any(remark in line and line.startswith("xosc-lateral: note: ") for line in lines[:-1]), text
+    assert lines[-1].startswith("xosc-lateral: ") and values["error"]["message"] in lines[-1]
+    assert len(set(lines)) == len(lines)

@@ -118,8 +118,9 @@ def test_a_lane_without_width_is_refused_by_name(scenario: Path, capsys: pytest.
     road.write_text(re.sub(r'(<width [^>]*)a="[^"]*"', r'\1a="0"', text), encoding="utf-8")
     before = _files(scenario.parent)
     assert main(["convert", str(scenario), "-o", str(scenario.parent / "out.xosc")]) == 1
-    (line,) = capsys.readouterr().err.splitlines()
+    *remarks, line = capsys.readouterr().err.splitlines()
     assert line.endswith("cut-in.xodr: road '1': lane -1 has no width where 'CutIn' follows it")
+    assert remarks and all("lane" in one and "is 0 m wide all along a section" in one for one in remarks)
     assert _files(scenario.parent) == before
 
 

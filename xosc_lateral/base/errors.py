@@ -19,6 +19,7 @@ class XoscLateralError(Exception):
     """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr: no file moves a cursor."""
 
     typed: str | None = None  # the line as the command line says it, where a call of Python says it in its own words
+    messages: tuple[object, ...] = ()  # what was remarked before it, as `messages` of results are: often, why
 
     def __str__(self) -> str:
         return printable(by_owner(cut(super().__str__())))

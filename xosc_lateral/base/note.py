@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from xosc_lateral.base.errors import by_owner, locate, printable
+from xosc_lateral.base.errors import XoscLateralError, by_owner, locate, printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,3 +79,13 @@ def warnings(lines: Iterable[str], *, entity: str | None = None) -> tuple[Note, 
 def rows_left_out(rows: Mapping[str, int]) -> tuple[Note, ...]:
     """Rows of a table that are in no result, by reason."""
     return notes((f"rows left out: {count} {why}" for why, count in rows.items() if count))
+
+
+@contextmanager
+def remarked_before(notes: Callable[[], Iterable[Note]]) -> Iterator[None]:
+    """What is refused within carries what was remarked until then (`XoscLateralError.messages`), each once."""
+    try:
+        yield
+    except XoscLateralError as error:
+        error.messages = tuple(dict.fromkeys((*notes(), *error.messages)))
+        raise

@@ -14,7 +14,7 @@ from typing import Annotated, Any, cast
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from xosc_lateral.base.errors import FormatError, XoscLateralError
+from xosc_lateral.base.errors import XoscLateralError
 from xosc_lateral.base.names import in_json, in_terminal
 from xosc_lateral.base.plugins import offered
 from xosc_lateral.base.signals import Interrupted, raising_signals
@@ -129,17 +129,15 @@ def _in_words(error: XoscLateralError | OSError) -> str:
 
 def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
     """The error for machines: `kind`, `message`, and where it is, as far as that is known."""
-    place: dict[str, Any] = {"path": None, "line": None, "element": None}
-    if isinstance(error, FormatError):
-        path = None if error.path is None else str(error.path)
-        place = {"path": path, "line": error.line, "element": error.element}
-    elif isinstance(error, OSError) and error.filename is not None:
-        place["path"] = str(error.filename)
-    return {"error": {"kind": type(error).__name__, "message": " ".join(_in_words(error).split()), **place}}
+    path = getattr(error, "path", None) or getattr(error, "filename", None)
+    place = {name: getattr(error, name, None) for name in ("line", "element")}
+    what = {"kind": type(error).__name__, "message": " ".join(_in_words(error).split())}
+    messages = [one.to_dict() for one in getattr(error, "messages", ())]
+    return {"error": {**what, "path": None if path is None else str(path), **place, "messages": messages}}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 128 + a signal."""
+    """Run one command; 0 done, 1 the input is at fault (remarks, a line on stderr), 2 wrong usage, 128 + a signal."""
     words = sys.argv[1:] if argv is None else list(argv)
     try:
         with guarding_inputs(), raising_signals():
@@ -151,6 +149,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             from xosc_lateral.cli.cures import cures
 
+            for remark in getattr(error, "messages", ()):
+                print(in_terminal(f"xosc-lateral: {remark.to_dict()['severity']}: {remark}"), file=sys.stderr)
             line = "; ".join([_in_words(error), *cures(words)])
             line = in_terminal(f"xosc-lateral: {' '.join(line.split())}")
             if "--json" in words and {"-v", "--verbose"} & {*words}:

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 import xosc_lateral as xl
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.signals import Interrupted
 from xosc_lateral.cli import VERBS, group_of_verbs
 from xosc_lateral.cli.words import Options, Printing, Writing, command, say, say_json, write_stdout
@@ -29,12 +30,11 @@ class _WithPanels(TyperCommand):
     """Options of a batch under a heading of their own, which Typer has only where rich formats."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        panels: dict[str, list[tuple[str, str]]] = {}
-        for param in self.get_params(ctx):
-            usual = "Arguments" if param.param_type_name == "argument" else "Options"
-            record = param.get_help_record(ctx)
-            if record is not None:
-                panels.setdefault(getattr(param, "rich_help_panel", None) or usual, []).append(record)
+        usual = {"argument": "Arguments", "option": "Options"}
+        panels = grouped(
+            (getattr(param, "rich_help_panel", None) or usual[param.param_type_name], record)
+            for param in self.get_params(ctx) if (record := param.get_help_record(ctx)) is not None
+        )
         for title, records in panels.items():
             with formatter.section(title):
                 formatter.write_dl(records)

@@ -16,6 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import FloatArray
 from xosc_lateral.base.errors import FormatError, XoscLateralError, meant_for
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.lazy import pa, parquet, pd
 from xosc_lateral.base.limits import TABLE_CELLS, TABLE_COLUMNS, TIME
 from xosc_lateral.base.texts import composed
@@ -102,10 +103,8 @@ def _texts_of_digits(head: bytes, separator: str) -> dict[str, type[str]]:
 
 def _in_parts(text: IO[bytes], start: int, **csv: Any) -> pd.DataFrame:
     """The table, in little more memory than its numbers take: read in parts, as whole where these differ in kind."""
-    columns: dict[str, list[pd.Series]] = {}
-    for part in pd.read_csv(text, chunksize=PART_ROWS, **csv):
-        for name in part.columns:
-            columns.setdefault(name, []).append(part[name].copy())  # the part itself goes
+    parts = pd.read_csv(text, chunksize=PART_ROWS, **csv)
+    columns = grouped((name, part[name].copy()) for part in parts for name in part.columns)  # the parts themselves go
     if not columns or any(len({one.dtype.kind in "iuf" or one.dtype for one in each}) > 1 for each in columns.values()):
         text.seek(start)
         whole: pd.DataFrame = pd.read_csv(text, **csv)

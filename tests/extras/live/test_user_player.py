@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -11,8 +12,13 @@ import pytest
 
 import xosc_lateral as xl
 from tests.kit.made.reactive import reactive_scenarios
-from xosc_lateral.extras.live.user_player import _otherwise, happens, told_by_player
+from xosc_lateral.extras.live.esmini_library import OBJECT_STATE
+from xosc_lateral.extras.live.user_player import COMPLETE, RUNNING, Happened, as_motion, happens, told_by_player
 from xosc_lateral.workflows.conversion.load import play_scenario
+from xosc_lateral.workflows.conversion.shifts import compare_runs
+from xosc_lateral.world.motion.look import look_at
+from xosc_lateral.world.motion.nominal import NominalMotion
+from xosc_lateral.world.road.network import RoadNetwork
 
 REAL = os.environ.get("ESMINI_LIBRARY")
 needs_esmini = pytest.mark.skipif(not REAL, reason="ESMINI_LIBRARY names no library of esmini")
@@ -27,21 +33,54 @@ def cut_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "scenario.xosc"
 
 
-def test_lost_late_and_other_lanes_are_told_and_what_is_due_at_the_end_is_not(cut_in: Path) -> None:
-    run = play_scenario(cut_in, step=0.05).motion
+def happened(run: NominalMotion, network: RoadNetwork) -> Happened:
+    """What a player would say that plays as ours does, along a road that is driven along its s."""
+    states = np.zeros((len(run.entities), len(run.entities[0].time)), dtype=OBJECT_STATE)
+    for row, one in zip(states, run.entities, strict=True):
+        for name, ours in (("x", "x"), ("y", "y"), ("h", "heading"), ("speed", "speed"), ("s", "s"), ("lane", "lane")):
+            row[name] = one.columns[ours]
+        row["offset_t"], row["road"] = one.offset, [int(network.road_ids[road]) for road in one.road]
+    names = [one.name for one in run.entities]
+    frames = [dict(zip(names, frame.copy(), strict=True)) for frame in states.T]
+    changes = [
+        ("::".join(one.path), state, at)
+        for one in run.actions
+        for state, at in ((RUNNING, one.start), (COMPLETE, one.end))
+        if at is not None
+    ]
+    return run.entities[0].time.tolist(), frames, changes
+
+
+def test_what_a_player_does_is_told_by_the_look_and_the_comparison_of_the_check(cut_in: Path) -> None:
+    played = play_scenario(cut_in, step=0.01)
+    run, network = played.motion, played.network
     (action,) = (one for one in run.actions if one.path != ("Init",) and one.actor == "T")
     name, start = "::".join(action.path), action.start
 
-    def said(now: list[float], lane: int = -2, then: list[float] | None = None) -> list[str]:
-        before = {name: [start] if then is None else then}, {"T": -2}
-        return list(_otherwise(before, ({name: now}, {"T": lane}), run, {"T"}, 0.05))
+    def said(times: list[float], lane: int | None = None, aside: float = 0.0) -> list[str]:
+        time, frames, changes = happened(run, network)
+        changes = [one for one in changes if one[0] != name] + [(name, RUNNING, at) for at in times]
+        changes += [(name, COMPLETE, action.end + times[0] - start) for _ in times[:1]]
+        for at, states in zip(time, frames, strict=True):
+            if lane is not None and at > run.end_time - 1.0:
+                states["T"]["lane"], states["T"]["offset_t"] = lane, 0.0
+            states["T"]["y"] += aside if at > 5.0 else 0.0
+        both = happened(run, network), (time, frames, changes)
+        before, after = (as_motion(one, run, network, {"T"}) for one in both)
+        compared = compare_runs(played.scenario, network, before, after, ignored={"Ego"}, ends=False)
+        found = look_at(network, before, after, {"T"}, shifted=compared.first)
+        return [str(one.note) for one in compared.changes] + [str(one.note(None)) for one in found]
 
+    event = f"event 'cut in' of 'T' at {start:.2f} s"
+    assert said([start]) == []
     assert said([start + 0.04]) == []
-    assert said([]) == ["event 'cut in' of 'T' happens 0 times instead of 1"]
-    assert said([start, start + 5.0]) == ["event 'cut in' of 'T' happens 2 times instead of 1"]
-    assert said([start + 0.4]) == ["event 'cut in' of 'T' happens 0.40 s later"]
-    assert said([start], lane=-1) == ["'T' ends in lane -1 instead of -2"]
-    assert said([], then=[run.end_time]) == []
+    assert said([]) == [f"{event} no longer happens with the offsets"]
+    again = f"event 'cut in' of 'T' at {start + 5.0:.2f} s"
+    assert said([start, start + 5.0]) == [f"{again} happens once more with the offsets"]
+    assert said([start + 0.4])[0] == f"{event} happens 0.40 s later with the offsets"
+    assert any("the last lane of 'T', -2, is -1" in line for line in said([start], lane=-1))
+    (corner,) = said([start], aside=0.05)
+    assert "'T' is driven round a corner" in corner and re.search(r"at (4\.9|5\.[01]) s", corner)
 
 
 @needs_esmini
@@ -55,16 +94,16 @@ def test_esmini_is_content_with_an_output_and_tells_of_a_cut_in_that_was_taken_o
     told = list(
         told_by_player(
             Path(REAL),
-            cut_in,
+            played.scenario,
             (cut_in, never),
             [("nominal", played.motion)],
             played.network,
             egos=["Ego"],
             moved=["T"],
-            allowed=0.0,
         )
     )
-    assert any("event 'cut in' of 'T' happens 0 times instead of 1 (run: nominal)" in str(note) for note in told), told
+    assert any("event 'cut in' of 'T'" in note.what and "no longer happens" in note.what for note in told), told
+    assert {note.run for note in told} == {"nominal"}
     assert [one.name for one in cut_in.parent.glob(".*")] == []
 
 
@@ -76,6 +115,6 @@ def test_a_player_follows_who_is_driven_from_outside(cut_in: Path, tmp_path: Pat
     run = play_scenario(cut_in, step=0.05).motion
     ego = next(one for one in run.entities if one.name == "Ego")
     held = np.stack([ego.time, np.full_like(ego.x, ego.x[0]), np.full_like(ego.x, ego.y[0]), 0 * ego.x, 0 * ego.x])
-    starts, lanes = happens(tmp_path / "there" / "scenario.xosc", REAL, {"Ego": held}, 20.0)
-    assert not [path for path in starts if "cut in" in path]
-    assert lanes["T"] == -1
+    _, frames, changes = happens(tmp_path / "there" / "scenario.xosc", REAL, {"Ego": held}, 20.0)
+    assert not [path for path, state, _ in changes if "cut in" in path and state == RUNNING]
+    assert frames[-1]["T"]["lane"] == -1

@@ -70,6 +70,18 @@ def test_a_place_is_not_judged_by_the_strict_limit_after_an_event_has_moved() ->
     assert not list(compare_tracks(source, late, shifted=10.0))
 
 
+@pytest.mark.parametrize(
+    ("faster", "shifted", "is_meaning"), [(0.4, np.inf, True), (0.12, np.inf, False), (0.4, 10.0, False)]
+)
+def test_who_is_far_elsewhere_though_nothing_came_at_another_time_has_another_meaning(
+    faster: float, shifted: float, is_meaning: bool
+) -> None:
+    """In 10 s 4.0 or 1.2 m farther: the first is more than an event that comes a little later would explain."""
+    (found,) = compare_tracks(track(EVEN, NONE), track(EVEN + faster * LATER, NONE), shifted)
+    assert (found.kind, found.is_meaning) == ("elsewhere", is_meaning)
+    assert found.size == pytest.approx(10.0 * faster, rel=0.02)
+
+
 def test_who_drives_beside_the_middle_of_a_bend_is_where_his_speed_takes_him() -> None:
     """0.4 m to the inside of a bend of 50 m his way is 3.2 m in 400 m shorter: no finding; on a straight it is one."""
     inside, sooner = np.full(len(TIME), 0.4), EVEN / 0.992

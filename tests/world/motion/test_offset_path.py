@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from xosc_lateral.base.segment import own_time, way_of
 from xosc_lateral.world.motion.driver_clock import CUT_SHARE, DriverClock
 from xosc_lateral.world.motion.look import FRAME_TURN, LATERAL_ACCELERATION, LOOK_STEP
 from xosc_lateral.world.motion.offset_path import _slower, bounded, calm
@@ -21,17 +22,20 @@ def test_the_slower_movement_is_the_nearest_that_there_is(seed: int) -> None:
     assert np.abs(slower - values).max() == pytest.approx(0.5 * apart.max())
 
 
-@pytest.mark.parametrize("speed", [8.0, 15.0, 30.0])
+@pytest.mark.parametrize("speed", [3.0, 6.4, 8.0, 15.0, 30.0])
 def test_where_an_action_may_begin_nobody_has_more_lateral_speed_than_it_may_take_away(speed: float) -> None:
+    """Seen on the road: by how much the path is turned, and how fast the car moves sideways at that speed."""
     distance = np.arange(0.0, 2000.0, 0.2)
-    clock = DriverClock(distance, np.full(len(distance), speed), distance / max(speed, 40.0 / 3.6))
-    most = CUT_SHARE * min(FRAME_TURN * max(speed, 40.0 / 3.6), LATERAL_ACCELERATION * LOOK_STEP)
+    clock = DriverClock(distance, np.full(len(distance), speed), own_time(distance / speed, np.full(10_000, speed)))
+    turn, sideways = CUT_SHARE * FRAME_TURN, CUT_SHARE * LATERAL_ACCELERATION * LOOK_STEP
+    most = min(turn, sideways / speed)
     at = clock.distance_at(np.arange(2.0, clock.time[-1] - 2.0, 0.01))
-    for rate, is_changed in ((0.5 * most, False), (2.0 * most, True)):
+    for slope, is_changed in ((0.5 * most, False), (2.0 * most, True)):
+        rate = slope * float(way_of(np.array([speed]))[0])
         sways = lambda place, rate=rate: rate / 0.8 * np.sin(0.8 * clock.time_at(place))  # noqa: E731
-        assert np.abs(np.gradient(sways(at), 0.01)).max() == pytest.approx(rate, rel=0.01)
+        assert np.abs(np.gradient(sways(at), at)).max() == pytest.approx(slope, rel=0.01)
         moves = bounded(sways, clock, is_cut=True)(at)
-        assert np.abs(np.gradient(moves, 0.01)).max() <= most * 1.02
+        assert np.abs(np.gradient(moves, at)).max() <= most * 1.02
         assert np.allclose(moves, sways(at)) is not is_changed
 
 

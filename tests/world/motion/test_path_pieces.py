@@ -200,5 +200,5 @@ def test_moves_and_vertices_of_long_runs_are_those_of_one_pass(monkeypatch: pyte
     whole = made()
     assert len(whole) > 3
     for size in (97, 250):
-        monkeypatch.setattr("xosc_lateral.base.rows.BLOCK", size)
+        monkeypatch.setattr("xosc_lateral.base.arrays.BLOCK", size)
         assert made() == [(one, pytest.approx(times, abs=1e-9)) for one, times in whole]

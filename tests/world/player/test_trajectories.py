@@ -56,6 +56,13 @@ def test_in_position_mode_the_heading_turns_near_corners_only(tmp_path: Path) ->
     assert path.at(13.0).heading == pytest.approx(pi / 2)
 
 
+def test_who_turns_back_turns_to_the_left_from_east_and_to_the_right_from_west_as_in_esmini() -> None:
+    """The difference of headings in [0, 2 pi) is half a turn: its sign is that of esmini's `GetAngleDifference`."""
+    there, back = PolylinePath([Corner(0, 0), Corner(10, 0), Corner(0, 0), Corner(10, 0)]), 20.0
+    assert [there.at(at).heading for at in (9.0, 10.0, 11.0)] == pytest.approx([pi / 4, pi / 2, 3 * pi / 4])
+    assert [there.at(back + at).heading for at in (-1.0, 0.0, 1.0)] == pytest.approx([3 * pi / 4, pi / 2, pi / 4])
+
+
 def test_in_follow_mode_the_heading_turns_evenly() -> None:
     path = PolylinePath([Corner(0, 0, heading=0.0), Corner(10, 0, heading=1.0)], follow=True)
     assert path.at(2.5).heading == pytest.approx(0.25)

@@ -20,7 +20,7 @@ def entity(name: str, category: EntityCategory = EntityCategory.VEHICLE) -> Enti
 
 def scenario(*names: str, hashes: dict[Path, str] | None = None) -> Scenario:
     board = Storyboard(Init((), (), ()), (), None, PLACE)
-    header = FileHeader(1, 2, "a", "d", "2024-01-01")
+    header = FileHeader(1, 2, "d")
     return Scenario(
         Path("f.xosc"), header, {}, {}, {}, None, (), tuple(map(entity, names)), board, input_hashes=hashes or {}
     )
@@ -32,7 +32,7 @@ def scenario(*names: str, hashes: dict[Path, str] | None = None) -> Scenario:
 )
 def test_only_a_description_that_begins_with_carla_makes_y_point_right(description, left_handed):
     """As scenario_runner tells its own files (`convert to left-handed` by that prefix)."""
-    assert FileHeader(1, 0, "a", description, "d").is_left_handed is left_handed
+    assert FileHeader(1, 0, description).is_left_handed is left_handed
 
 
 def test_entities_are_found_by_name_and_only_vehicles_are_given_movement():

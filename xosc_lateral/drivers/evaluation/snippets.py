@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, IntArray
 from xosc_lateral.base.errors import NotEnoughDataError
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.segment import Segment
 from xosc_lateral.drivers.drives.drive import Run
 from xosc_lateral.drivers.drives.filters import tapered_powers, without_line
@@ -122,9 +123,8 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
             for k, run in enumerate(runs)
         ]
     paths, step = [np.empty(0)] * len(runs), profile.model.step
-    of_drive: dict[str, list[int]] = {}
-    for k in sorted(range(len(runs)), key=lambda k: float(runs[k].time[0])):
-        of_drive.setdefault(runs[k].drive, []).append(k)
+    in_time = sorted(range(len(runs)), key=lambda k: float(runs[k].time[0]))
+    of_drive = grouped((runs[k].drive, k) for k in in_time)
     for number, drive in enumerate(dict.fromkeys(run.drive for run in runs)):
         driver, end = OffsetSampler(profile, child(root, number)), 0.0
         for k in of_drive[drive]:

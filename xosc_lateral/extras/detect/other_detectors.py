@@ -16,6 +16,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
 from xosc_lateral.base.errors import NotEnoughDataError, SimulationError, did_you_mean
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.extras.detect.detectors import RULES, Detector, Learner, read_rule
 from xosc_lateral.extras.detect.observation import PERFECT_SENSOR, SensedTrack, View, measure, read_numbers
 from xosc_lateral.extras.detect.scoring import cut_ins_of
@@ -54,9 +55,7 @@ class Command(Detector):
         scores = [np.zeros(len(view.track)) for view in views]
         if not views:
             return scores
-        watched: dict[tuple[int, str], list[int]] = {}
-        for number, view in enumerate(views):
-            watched.setdefault((view.number, view.track.name), []).append(number)
+        watched = grouped(((view.number, view.track.name), number) for number, view in enumerate(views))
         with _started(self.words, scene.name) as talk:
             for line, present in _steps(scene, views):
                 limit = START_TIME if line["time"] == present[0] else self._answer_time

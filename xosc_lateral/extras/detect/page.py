@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.texts import hours_in_words
 from xosc_lateral.extras.detect.scoring import CASE_MARGIN, Case, Curve, alarms_in_words
 from xosc_lateral.extras.detect.tracks import STEP, LaneTrack
@@ -69,10 +70,7 @@ def detection_page(
 def _telling(curves: Sequence[Curve]) -> list[Curve]:
     """Of the detector whose false alarms differ most between sources, or are most of all where there is one source;
     one that sees cut-ins, if any does."""
-    detectors: dict[str, list[Curve]] = {}
-    for curve in curves:
-        if curve.hours.sum() > 0.0:
-            detectors.setdefault(curve.detector.label(), []).append(curve)
+    detectors = grouped((curve.detector.label(), curve) for curve in curves if curve.hours.sum() > 0.0)
 
     def spread(some: Sequence[Curve]) -> tuple[bool, float]:
         rates = [_rate(curve) for curve in some]

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from xosc_lateral.base.errors import SimulationError, XoscLateralError
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.track import KNOWN
 from xosc_lateral.files.opendrive.reader import read_opendrive
@@ -112,9 +113,7 @@ def later_actions(scenario: Path, spans: Spans, end: float) -> list[str]:
 
 def not_driven(why: Mapping[str, str]) -> list[str]:
     """Vehicles that had no driver of ours, by the reason for it: a line each."""
-    names: dict[str, list[str]] = {}
-    for name, reason in why.items():
-        names.setdefault(reason, []).append(repr(name))
+    names = grouped((reason, repr(name)) for name, reason in why.items())
     return [f"not driven, {reason}: {', '.join(sorted(who))}" for reason, who in names.items()]
 
 

@@ -19,6 +19,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import BoolArray, FloatArray, IndexArray
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.drivers.model.effects import ColumnEffect, Product
 from xosc_lateral.extras.loop.autocorrelation import Whitener
 from xosc_lateral.extras.loop.candidates import Candidate, Family, candidates_of
@@ -225,11 +226,8 @@ def beside_parts(
     """Scores of products, where less, beside all that either column does alone (`spans`); no vector's components. None
     that explains less than slopes of each drive's own (`by_drive`) would: it would stand for which drive it is. What is
     below the best by more than a `margin` stays as it is."""
-    members: dict[tuple[str, ...], list[int]] = {}
-    for index in np.flatnonzero(np.isfinite(scores)):
-        candidate = dictionary.candidates[index]
-        if len(candidate.columns) > 1 and not candidate.of_vector:
-            members.setdefault(candidate.columns, []).append(int(index))
+    known_scores = ((index, dictionary.candidates[index]) for index in np.flatnonzero(np.isfinite(scores)).tolist())
+    members = grouped((one.columns, index) for index, one in known_scores if len(one.columns) > 1 and not one.of_vector)
     scores, best = scores.copy(), {pair: float(scores[entries].max()) for pair, entries in members.items()}
     for pair in sorted(members, key=best.__getitem__, reverse=True):
         if best[pair] < float(scores.max()) - margin:

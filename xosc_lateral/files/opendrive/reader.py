@@ -7,6 +7,8 @@ from math import hypot
 from os import PathLike, fspath
 from pathlib import Path
 
+from xosc_lateral.base.grouping import grouped
+from xosc_lateral.base.note import remarked_before
 from xosc_lateral.files.opendrive.document import RoadFile, XmlElement, plain_root
 from xosc_lateral.files.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.files.opendrive.plan_view import Record, finish_elements, read_plan_view
@@ -38,6 +40,11 @@ def parse_opendrive(data: bytes, name: str) -> RoadNetwork:
 
 def _network(document: XmlDocument, path: str) -> RoadNetwork:
     root, source = plain_root(document.root, path), RoadFile(path, document.sha256)
+    with remarked_before(lambda: source.notes):
+        return _network_at(root, source)
+
+
+def _network_at(root: XmlElement, source: RoadFile) -> RoadNetwork:
     elements = list(root.iterfind("road"))
     if not elements:
         raise source.error("no road", root)
@@ -165,9 +172,10 @@ def _profile(element: XmlElement, tag: str, source: RoadFile) -> PiecewiseCubic:
 
 
 def _read_shape(element: XmlElement, source: RoadFile) -> Shape | None:
-    stations: dict[float, list[tuple[float, tuple[float, float, float, float]]]] = {}
-    for e in element.iterfind("lateralProfile/shape"):
-        stations.setdefault(source.number(e, "s"), []).append((source.number(e, "t"), source.cubic(e)))
+    stations = grouped(
+        (source.number(e, "s"), (source.number(e, "t"), source.cubic(e)))
+        for e in element.iterfind("lateralProfile/shape")
+    )
     if not stations:
         return None
     ordered = sorted(stations)

@@ -40,7 +40,6 @@ class LogicalScenario:
     place: Place  # of the distribution
     _declared: Mapping[str, str] = field(repr=False)  # what the scenario declares
     _constrained: list[XmlElement] = field(repr=False)  # those declarations that have a constraint group
-    discarded: int = 0  # parameter sets left out so far because they violate the scenario's constraint groups
     _begin: float = field(init=False, repr=False, default=0.0)
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
@@ -51,7 +50,7 @@ class LogicalScenario:
 
         Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
         """
-        self.discarded, self._begin = 0, time.monotonic()
+        self._begin = time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
         if self.count > limit.value:
             raise self.place.error(limit.refusal(self.count))
@@ -85,15 +84,9 @@ class LogicalScenario:
         for name in values:
             if name not in self._declared:
                 raise self.place.error(f"parameter '{name}' is not declared in {self.scenario_file}")
-        if not self._constrained:
-            return True
         scope = Scope({**self._declared, **values})
-        for declaration in self._constrained:
-            item = declaration.within(scope)
-            if references.broken_constraint(item, references.value_of(item)):
-                self.discarded += 1
-                return False
-        return True
+        items = (declaration.within(scope) for declaration in self._constrained)
+        return not any(references.broken_constraint(item, references.value_of(item)) for item in items)
 
 
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:

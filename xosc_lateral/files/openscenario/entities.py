@@ -56,11 +56,9 @@ def _weather(element: XmlElement, context: Context) -> Weather:
     """`Precipitation/@intensity` was a share in version 1.0, and is read as mm/h from 1.1 on."""
     rain = element.child("Precipitation")
     intensity = None if rain is None else rain.optional_number("precipitationIntensity")
-    stated = None if rain is None else rain.optional_number("intensity")
-    fraction = stated if context.version == (1, 0) else None
-    if context.version != (1, 0) and intensity is None:
-        intensity = stated
-    return read_struct(Weather, element, context, precipitation_intensity=intensity, precipitation_fraction=fraction)
+    if rain is not None and intensity is None and context.version != (1, 0):
+        intensity = rain.optional_number("intensity")
+    return read_struct(Weather, element, context, precipitation_intensity=intensity)
 
 
 USUAL_ACCELERATION = 10.0

@@ -10,7 +10,7 @@ from lxml import etree
 from msgspec import Struct
 
 from xosc_lateral.base.errors import FormatError, absent, meant_for
-from xosc_lateral.base.note import Note
+from xosc_lateral.base.note import Note, remarked_before
 from xosc_lateral.files.held import is_file
 from xosc_lateral.files.openscenario import references
 from xosc_lateral.files.openscenario.context import Context, read_struct
@@ -123,43 +123,44 @@ def read_scenario(
     if root.child("Storyboard") is None and root.child("Catalog") is not None:
         root.fail("is a catalog, not a scenario")
     notes: list[Note] = []
-    header = read_header(root)
-    if header.version > NEWEST_VERSION:
-        notes.append(root.place().note(f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}"))
-        notes.extend(note_newer(root))
-    notes.extend(note_spellings(root))
-    scope, values = references.read_declarations(root, dict(parameters or {}), notes)
-    root = root.within(scope)
-    boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
-    locations = _catalog_locations(root)
-    catalogs = references.Catalogs(locations, boundary, notes)
-    context = Context(header.version, catalogs, notes, READERS, strict=strict, left_handed=header.is_left_handed)
-    if header.is_left_handed:
-        notes.append(root.place().note(LEFT_HANDED))
-    network = root.child("RoadNetwork")
-    logic = network.child("LogicFile", "Logics") if network else None
-    written = logic.text("filepath", "") if logic else ""
-    road_file = roads.file if network else None
-    if road_file is None and logic and written.strip():
-        road_file = _road_file(logic, written, boundary, notes, roads)
-    listed_controllers = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
-    controllers = tuple(read_struct(TrafficSignalController, each, context) for each in listed_controllers)
-    entities = read_entities(root, context)
-    storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
-    return Scenario(
-        path=path,
-        header=header,
-        parameters=values,
-        variables=references.read_variables(root),
-        catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
-        road_file=road_file,
-        traffic_signal_controllers=controllers,
-        entities=entities,
-        storyboard=storyboard,
-        notes=tuple(notes),
-        input_hashes={path: document.sha256, **catalogs.used},
-        source=document.data,
-    )
+    with remarked_before(lambda: notes):
+        header = read_header(root)
+        if header.version > NEWEST_VERSION:
+            notes.append(root.place().note(f"version 1.{header.minor} is read as 1.{NEWEST_VERSION[1]}"))
+            notes.extend(note_newer(root))
+        notes.extend(note_spellings(root))
+        scope, values = references.read_declarations(root, dict(parameters or {}), notes)
+        root = root.within(scope)
+        boundary = Boundary(path.parent, references.allowed_roots(path, allowed))
+        locations = _catalog_locations(root)
+        catalogs = references.Catalogs(locations, boundary, notes)
+        context = Context(header.version, catalogs, notes, READERS, strict=strict, left_handed=header.is_left_handed)
+        if header.is_left_handed:
+            notes.append(root.place().note(LEFT_HANDED))
+        network = root.child("RoadNetwork")
+        logic = network.child("LogicFile", "Logics") if network else None
+        written = logic.text("filepath", "") if logic else ""
+        road_file = roads.file if network else None
+        if road_file is None and logic and written.strip():
+            road_file = _road_file(logic, written, boundary, notes, roads)
+        listed_controllers = network.listed("TrafficSignals", "TrafficSignalController") if network else ()
+        controllers = tuple(read_struct(TrafficSignalController, each, context) for each in listed_controllers)
+        entities = read_entities(root, context)
+        storyboard = read_struct(Storyboard, root.required("Storyboard"), context)
+        return Scenario(
+            path=path,
+            header=header,
+            parameters=values,
+            variables=references.read_variables(root),
+            catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
+            road_file=road_file,
+            traffic_signal_controllers=controllers,
+            entities=entities,
+            storyboard=storyboard,
+            notes=tuple(notes),
+            input_hashes={path: document.sha256, **catalogs.used},
+            source=document.data,
+        )
 
 
 def open_scenario(document: etree._Element, path: Path) -> XmlElement:
@@ -182,7 +183,7 @@ def read_header(root: XmlElement) -> FileHeader:
     major = header.value("revMajor", int, 1)
     if major != 1:
         header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are, later 1.x as 1.3")
-    return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
+    return FileHeader(major, minor, header.text("description", ""))
 
 
 def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:

@@ -241,7 +241,8 @@ def _run_job(converter: Converter, limits: JobLimits, run: str, job: Job) -> _Re
     except (XoscLateralError, OSError) as error:
         if isinstance(error, OSError) and error.errno in _STOPPING:
             return _Reply(job.row(str(error)), stop=f"{job.output}: {error.strerror or error}")
-        row = job.row(" ".join(str(error).split()))
+        remarks = (str(one) for one in getattr(error, "messages", ()) if one.is_warning)
+        row = replace(job.row(" ".join(str(error).split())), warnings=tuple(remarks))
     except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
         place = traceback.extract_tb(error.__traceback__)[-1]
         what = f"{type(error).__name__}: {' '.join(str(error).split())} ({Path(place.filename).name}:{place.lineno})"

@@ -41,11 +41,11 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
         at_work = ((activity & Activity.LATERAL) != 0) & ((activity & Activity.ACTIVE) != 0)
         return np.asarray(at_work & (motion.road[rows] >= 0))
 
-    def in_one_lane(part: slice) -> bool:
-        return all((motion.lane[rows] == motion.lane[part.start]).all() for rows in blocks(part.stop, part.start))
-
-    parts = slices_where(len(motion.time), lateral)
-    return [(part.start, part.stop - 1) for part in parts if in_one_lane(part)]
+    return [
+        (part.start, part.stop - 1)
+        for part in slices_where(len(motion.time), lateral)
+        if all((motion.lane[rows] == motion.lane[part.start]).all() for rows in blocks(part.stop, part.start))
+    ]
 
 
 def stay_as_written(enriched: Enriched, on_trajectories: Collection[str]) -> tuple[str, ...]:

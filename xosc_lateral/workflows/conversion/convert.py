@@ -14,7 +14,7 @@ from typing import Unpack
 from msgspec import structs
 
 from xosc_lateral.base.errors import DriverProfileError, FormatError, absent
-from xosc_lateral.base.note import notes, warnings
+from xosc_lateral.base.note import notes, remarked_before, warnings
 from xosc_lateral.base.plugins import service
 from xosc_lateral.drivers.model.effects.jam_corridor import JamCorridor
 from xosc_lateral.drivers.model.profile import DriverProfile
@@ -130,8 +130,9 @@ def convert_scenario(
             if isinstance(named, str | Path):  # though nobody may be driven by it
                 guard_input(Path(named))
         prepared = prepare(source, settings)
-        plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
-        return conversion_of(plan, carried_out(plan))
+        with remarked_before(lambda: prepared.played.motion.messages):
+            plan = decide(prepared, settings, output=output, variant_index=variant_index, report=report, saves=saves)
+            return conversion_of(plan, carried_out(plan))
 
 
 def carried_out(plan: Plan) -> Written:
@@ -228,10 +229,9 @@ def _as_far_as_equivalent(plan: Plan, sampled: Enriched, vehicles: WrittenAs) ->
     warned = list(kept.warnings(unmoved, known))
     if settings.player_library is not None:
         warned += service("told_by_player")(
-            settings.player_library, plan.source, (plan.output, best.file.data or b""),
+            settings.player_library, plan.played.scenario, (plan.output, best.file.data or b""),
             plan.prepared.equivalence(tuple(plan.egos)).runs, plan.played.network,
-            egos=plan.egos, moved=best.with_lane_offsets,
-            allowed=max((abs(one.start) for one in kept.shifts), default=0.0),
+            egos=plan.egos, moved=best.with_lane_offsets, replayed=vehicles.trajectories,
         )  # fmt: skip
     stays = (line for name in names for line in phases(name, kept.ways.get(name))[1])
     return replace(

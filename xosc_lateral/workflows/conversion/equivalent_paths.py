@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Generic, TypeVar
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.across import WAY_WORDS, Way
 from xosc_lateral.workflows.conversion.ego_drives import OTHER_RUNS
 from xosc_lateral.workflows.conversion.result import NOMINAL_RUN, EventShift
 from xosc_lateral.workflows.conversion.shifts import EVENT_TOLERANCE, HOW_NEW, Change, Comparison, largest_of, later
-from xosc_lateral.world.motion.look import Finding
 from xosc_lateral.world.motion.nominal import NominalMotion
 from xosc_lateral.world.motion.offset_path import OffsetPath, resized
 
@@ -101,11 +101,9 @@ class EquivalentPaths:
 
     def _findings(self) -> Iterator[Note]:
         """The worst of each kind for each vehicle, with its run."""
-        alike: dict[tuple[str, str], list[tuple[Finding, str]]] = {}
-        for compared in self.comparisons:
-            for finding in compared.findings:
-                alike.setdefault((finding.entity, finding.kind), []).append((finding, compared.run))
-        for alikes in alike.values():
+        for alikes in grouped(
+            ((one.entity, one.kind), (one, compared.run)) for compared in self.comparisons for one in compared.findings
+        ).values():
             worst, run = max(alikes, key=lambda each: each[0].size)
             yield worst.note(run, len(alikes) - 1)
 

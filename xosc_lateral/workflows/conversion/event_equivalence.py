@@ -158,7 +158,8 @@ class EventEquivalence:
                 for some in ((*comparison.changes, *meant), by_chance)
             )
             shifts = tuple(structs.replace(one, run=name) for one in comparison.shifts)
-            remarks = (*comparison.findings, *(one for one in findings if not one.is_meaning), *rests)
+            # contacts: nominally they are told of all pairs (`contact_notes`)
+            remarks = (*(comparison.findings if k else ()), *(one for one in findings if not one.is_meaning), *rests)
             yield Comparison(shifts, changes, remarks, by_chance, name), run
 
     def _by_chance(self, driven: Scenario, before: NominalMotion, trajectories: Collection[str]) -> dict[str, float]:

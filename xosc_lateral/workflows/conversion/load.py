@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
+from xosc_lateral.base.note import remarked_before
 from xosc_lateral.files.opendrive.reader import read_opendrive
 from xosc_lateral.files.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.files.source import check_regular, guard_input, state_key
@@ -76,15 +77,16 @@ def load_scenario(
     )
     if scenario.road_file is None:
         return Loaded(scenario.input_hashes, scenario, RoadNetwork(()))
-    network = road_network(scenario.road_file)
+    with remarked_before(lambda: scenario.notes):
+        network = road_network(scenario.road_file)
     return Loaded({**scenario.input_hashes, scenario.road_file: network.sha256}, scenario, network)
 
 
 def play_loaded(loaded: Loaded, step: float, time_limit: float | None) -> Played:
     """Play nominally; raises `PlaybackError`."""
-    played = Played(
-        loaded.scenario, loaded.network, play(loaded.scenario, loaded.network, step=step, time_limit=time_limit)
-    )
+    scenario, network = loaded.scenario, loaded.network
+    with remarked_before(lambda: network.notes):
+        played = Played(scenario, network, play(scenario, network, step=step, time_limit=time_limit))
     motion, doubts = played.motion, doubts_about(played.motion, played.network, played.trailers)
     return replace(played, motion=replace(motion, notes=(*played.network.notes, *motion.notes, *doubts)))
 

@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from xosc_lateral.base.arrays import FloatArray, IntArray, rate
 from xosc_lateral.base.errors import FormatError
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.note import Note, Telling, warnings
 from xosc_lateral.base.track import Track
 from xosc_lateral.drivers.drives.drive import STEP
@@ -59,6 +60,8 @@ _WANTED = {
 NOMINAL_RUN = "nominal"
 """Name of the run in which vehicles under test drive as written; others are named by what theirs do."""
 
+CONTACT_MOVED = 0.25
+"""By which a contact comes earlier or later without a word. [s]"""
 ROW_STEP = 0.1
 """Between rows that are drawn, and from which accelerations are taken. [s]"""
 
@@ -203,14 +206,10 @@ class Enriched:
 
     def responses(self, neighbours: str) -> dict[str, list[str]]:
         """How drivers respond to vehicles beside them, a line each, with the names of those who do so."""
-        alike: dict[str, list[str]] = {}
-        for entity in self.entities:
-            if entity.is_enriched:
-                alike.setdefault(entity.beside(neighbours), []).append(entity.name)
-        return alike
+        return grouped((one.beside(neighbours), one.name) for one in self.entities if one.is_enriched)
 
     def contact_notes(self) -> Iterator[Note]:
-        """Contacts that are new, and that are gone."""
+        """Contacts that are new, that are gone, and that come earlier or later."""
         for gaps, what in (
             (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
             (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
@@ -218,6 +217,12 @@ class Enriched:
             for gap in gaps:
                 both = "'{}' and '{}' ".format(*gap.names)
                 yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
+        touched = {gap.names: gap.time for gap in self.gaps_before if gap.touches}
+        for gap in self.gaps_after:
+            before = touched.get(gap.names, gap.time)
+            if gap.touches and abs(gap.time - before) > CONTACT_MOVED:
+                what = f"'{gap.names[0]}' and '{gap.names[1]}' touch at {gap.time:.1f} s instead of at {before:.1f} s"
+                yield Note(what, is_warning=True, run=NOMINAL_RUN)
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""

@@ -22,7 +22,7 @@ from msgspec import Struct
 from xosc_lateral.base.arrays import rate
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.note import Note
-from xosc_lateral.workflows.conversion.result import EventShift
+from xosc_lateral.workflows.conversion.result import CONTACT_MOVED, EventShift
 from xosc_lateral.world.motion.gaps import gaps_of
 from xosc_lateral.world.motion.look import STORY_PREFIX, Finding
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
@@ -48,8 +48,6 @@ LARGEST_DELAY_RATIO = 3.0
 """Times as late as an entity begins to change its speed, it comes to a distance from another: change over closing
 speed. What is later by more is told. [-]"""
 HOW_NEW = "is new"
-CONTACT_MOVED = 0.25
-"""By which a contact comes earlier or later without a word. [s]"""
 LEAST_WAY = 1e-3
 """A lateral action over less than this has no duration to compare. [m]"""
 
@@ -254,10 +252,9 @@ class _Shifts:
                 causes += [shift for path, shift in known.items() if refers_to(content, path)]
                 continue
             others += 1
-            looked_at = set(entity_references(content))
-            if condition.triggering_entities is not None:
-                looked_at |= set(condition.triggering_entities.entity_refs)
-            moved = [abs(shift) for name in looked_at for shift in self._of_entity.get(name, ())]
+            moved = [
+                abs(shift) for name in set(entity_references(condition)) for shift in self._of_entity.get(name, ())
+            ]
             far = LARGEST_DELAY_RATIO * max(moved, default=0.0)
             causes += np.arange(-far, far, EVENT_TOLERANCE / 5.0).tolist()
         return causes if causes and not others else [*causes, 0.0]

@@ -15,12 +15,17 @@ from xosc_lateral.base.note import Note
 from xosc_lateral.world.motion.gaps import box_distance, corners
 from xosc_lateral.world.motion.nominal import Activity, EntityMotion, FollowedRoute, NominalMotion
 from xosc_lateral.world.player.distances import HEIGHT_APART
+from xosc_lateral.world.player.drive import beside_line
+from xosc_lateral.world.road.geometry import ParamCubic
 from xosc_lateral.world.road.lanes import DRIVING
 from xosc_lateral.world.road.network import RoadNetwork
 from xosc_lateral.world.scenario.private_actions import LongitudinalDistanceAction
 
 LEAP_DISTANCE = 0.3
 """Further than who drives and slides aside at `MAXIMUM_LATERAL_SPEED`, and aside by this much more: a leap. [m]"""
+
+ALONG_CUBIC, CUBIC_STEP = 0.05, 0.1
+"""By how much somebody is elsewhere in esmini, seen so often. [m], [s]"""
 
 MAXIMUM_LATERAL_SPEED = 10.0
 """No lateral action is faster. [m/s]"""
@@ -34,11 +39,13 @@ _GUIDED = _LED | np.uint8(Activity.LATERAL | Activity.TELEPORTED)
 def doubts_about(motion: NominalMotion, network: RoadNetwork, trailers: dict[str, str]) -> tuple[Note, ...]:
     """Notes with file, line, entity and time; `trailers`: who is pulled from the start, and by whom."""
     notes: list[Note] = []
+    is_cubic = np.array([any(isinstance(one, ParamCubic) for one in road.elements) for road in network.roads] + [False])
     for entity in motion.entities:
         if entity.name not in trailers:
             notes += _jumps(entity, motion, network)
         if entity.entity.is_vehicle:
             notes += _lanes_for_nobody(entity, network)
+        notes += _along_cubics(entity, motion.step, network, is_cubic)
     for route in motion.routes:
         notes += _off_route(route, next(each for each in motion.entities if each.name == route.entity), motion, network)
     notes += _overlaps(motion, trailers)
@@ -105,6 +112,29 @@ def _lanes_for_nobody(entity: EntityMotion, network: RoadNetwork) -> Iterator[No
                 what = f"'{entity.name}' comes onto {where}, at {entity.time[rows.start - 1 + k]:.2f} s by itself"
                 yield entity.entity.place.note(what, is_warning=True)
                 return
+
+
+def _along_cubics(entity: EntityMotion, step: float, network: RoadNetwork, is_cubic: BoolArray) -> Iterator[Note]:
+    """Where esmini has it elsewhere: it takes a cubic's parameter for the share of the way; `is_cubic`: of roads."""
+    every = max(1, round(CUBIC_STEP / step))
+    drives = (entity.activity & (Activity.ACTIVE | Activity.TRAJECTORY)) == Activity.ACTIVE
+    rows = np.flatnonzero(drives & is_cubic[entity.road] & (entity.lane != 0))[::every]
+    places = entity.road[rows], entity.lane[rows], entity.s[rows]
+    t, further = network.offset_to_t(*places, entity.offset[rows]), np.zeros(len(rows) + 1)
+    for k, (road, lane, s) in enumerate(zip(*(column.tolist() for column in places), strict=True)):
+        _, _, element, begin, _ = network.roads[road].stretch_of(lane, s)
+        if isinstance(element, ParamCubic):
+            curvatures, way = (element.curvature_in_esmini, element.curvature_at), entity.speed[rows[k]] * every * step
+            theirs, ours = (beside_line(curvature(s - begin), t[k], way) for curvature in curvatures)
+            further[k] = theirs - ours
+    away = np.abs(np.cumsum(further))
+    if away.max() > ALONG_CUBIC:
+        first = entity.time[rows[int(np.argmax(away > ALONG_CUBIC))]]
+        what = (
+            f"'{entity.name}' is up to {away.max():.2f} m elsewhere along its road in esmini, from {first:.2f} s on: "
+            "esmini takes the curvature of a parametric cubic at another place"
+        )
+        yield entity.entity.place.note(what, entity=entity.name)
 
 
 def _type_at(entity: EntityMotion, network: RoadNetwork, row: int) -> str:

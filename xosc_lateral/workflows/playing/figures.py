@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.base.arrays import FloatArray, rate
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.note import Note
 from xosc_lateral.files.pages.chart import DASHED, GRID, MUTED, NOMINAL, SHADE, Panel, color_of, label_of
 from xosc_lateral.files.pages.figure import Figure
@@ -38,12 +39,12 @@ USUAL_ACCELERATION = 0.5
 # ---- over the road ---------------------------------------------------------------------------------------------------
 def _extents_on_roads(enriched: Enriched) -> dict[int, tuple[float, float]]:
     """Road -> the s that vehicles cover on it; most time spent first."""
-    covered: dict[int, list[FloatArray]] = {}
-    for entity in enriched.entities:
-        motion = entity.motion
-        here = (motion.activity & Activity.ACTIVE) != 0
-        for road in np.unique(motion.road[here & (motion.road >= 0)]).tolist():
-            covered.setdefault(road, []).append(motion.s[here & (motion.road == road)])
+    there = ((one.motion, (one.motion.activity & Activity.ACTIVE) != 0) for one in enriched.entities)
+    covered = grouped(
+        (road, motion.s[here & (motion.road == road)])
+        for motion, here in there
+        for road in np.unique(motion.road[here & (motion.road >= 0)]).tolist()
+    )
     whole = {road: np.concatenate(parts) for road, parts in covered.items()}
     order = sorted(whole, key=lambda road: -len(whole[road]))
     return {road: (float(whole[road].min()), float(whole[road].max())) for road in order}

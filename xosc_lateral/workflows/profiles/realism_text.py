@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.drivers.evaluation.classifier import TwoSampleResult
 from xosc_lateral.drivers.evaluation.lane_keeping import INDICATORS
 from xosc_lateral.drivers.evaluation.realism import ConditionScores, Realism
@@ -50,13 +51,15 @@ def start_fade_note(profile: DriverProfile) -> str:
 
 def condition_groups(realism: Realism) -> dict[str, list[ConditionScores]]:
     """Conditions that differ in length alone, the most telling first: heading -> by length."""
-    groups: dict[str, list[ConditionScores]] = {}
-    for each in sorted(realism.conditions, key=lambda each: (not each.condition.slow, each.condition.same_start)):
-        start = "same start" if each.condition.same_start else "free runs"
-        band = f"below {each.condition.below:g} Hz"
-        what = "driver and sensor" if each.with_sensor else "driver"
-        groups.setdefault(f"{start}, {band} ({what})", []).append(each)
-    return groups
+    ordered = sorted(realism.conditions, key=lambda each: (not each.condition.slow, each.condition.same_start))
+    return grouped(
+        (
+            f"{'same start' if each.condition.same_start else 'free runs'}, below {each.condition.below:g} Hz "
+            f"({'driver and sensor' if each.with_sensor else 'driver'})",
+            each,
+        )
+        for each in ordered
+    )
 
 
 def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:

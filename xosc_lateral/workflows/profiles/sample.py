@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.base.lazy import pd
 from xosc_lateral.base.note import Note, warnings
 from xosc_lateral.drivers.drives.drive import STEP, Drive
@@ -120,10 +121,10 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> tuple[s
 
     A column that a table has and that is empty all through a drive is known: there is none (no lane to that side).
     """
-    lacking: dict[tuple[str, ...], list[str]] = {}
-    for column in profile.columns:
-        names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
-        lacking.setdefault(names, []).append(column)
+    lacking = grouped(
+        (tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty}), column)
+        for column in profile.columns
+    )
     return tuple(
         f"{f'drive {names[0]}' if len(names) == 1 else f'{len(names)} of {len(drives)} drives'}: "
         f"{', '.join(columns)} {LEFT_OUT_NOTE}"

@@ -81,5 +81,7 @@ class DriverClock(Struct, frozen=True, eq=False):
 
     def limit_where_cut(self, at: FloatArray) -> FloatArray:
         """Of the lateral speed by the clock, at distances where an action may begin, which takes it away. [m/s]"""
-        speed = np.maximum(np.interp(at, self.distance, self.speed), MINIMUM_SPEED)
-        return CUT_SHARE * np.minimum(FRAME_TURN * speed, LATERAL_ACCELERATION * LOOK_STEP)
+        way = way_of(
+            np.interp(at, self.distance, self.speed)
+        )  # in a second of the clock, which is slower below 40 km/h
+        return CUT_SHARE * np.minimum(FRAME_TURN * way, LATERAL_ACCELERATION * LOOK_STEP)

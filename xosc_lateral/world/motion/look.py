@@ -203,7 +203,8 @@ def _elsewhere(both: _Both, shifted: float, limit: float) -> Iterator[Finding]:
             begins = float(both.time[np.argmax(rows & (far > most))])
             where = "along the road" if limit == ALONG else "from where it is as written"
             what = f"is up to {worst[1]:.2f} m elsewhere {where}, from {begins:.1f} s on,"
-            yield Finding("elsewhere", both.name, worst[0], worst[1], what)
+            # above the second limit though nothing came at another time: another meaning
+            yield Finding("elsewhere", both.name, *worst, what, is_meaning=most == ALONG and worst[1] > AFTER_A_SHIFT)
             return
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.base.arrays import BLOCK, FloatArray, columns
 from xosc_lateral.base.errors import PlaybackError
-from xosc_lateral.base.note import Note
+from xosc_lateral.base.note import Note, remarked_before
 from xosc_lateral.base.process import free_bytes
 from xosc_lateral.world.motion.nominal import CUT_OFF, Activity, NominalMotion
 from xosc_lateral.world.player.drive import align_trailers, connect, drive, halt_at_road_end, pull_trailers
@@ -61,7 +61,9 @@ def play(
         time_limit = RUN_TIME_LIMITS if _has_end(scenario) else TIME_LIMIT
     if not step > 0.0 or not time_limit >= 0.0:
         raise ValueError(f"step {step!r} s must be above 0, time limit {time_limit!r} s not below")
-    return _Player(scenario, network, step).play(time_limit)
+    simulation = Simulation(scenario, network)
+    with remarked_before(lambda: simulation.notes):
+        return _Player(simulation, step).play(time_limit)
 
 
 def _has_end(scenario: Scenario) -> bool:
@@ -70,9 +72,8 @@ def _has_end(scenario: Scenario) -> bool:
 
 
 class _Player:
-    def __init__(self, scenario: Scenario, network: RoadNetwork, step: float) -> None:
-        self.step_size = step
-        self.simulation = simulation = Simulation(scenario, network)
+    def __init__(self, simulation: Simulation, step: float) -> None:
+        self.step_size, self.simulation, scenario = step, simulation, simulation.scenario
         if not scenario.entities:
             raise PlaybackError("has no entities: there is nothing to play", path=scenario.path)
         self._couple_trailers()

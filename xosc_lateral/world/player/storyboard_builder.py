@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.world.player.actions import (
     at_once,
     follow_trajectory,
@@ -48,9 +49,7 @@ def build_storyboard(storyboard: read.Storyboard, simulation: Simulation) -> Sto
         for story in storyboard.stories
     ]
     root = StoryboardElement("", None, stories, stop_trigger=_trigger(storyboard.stop_trigger, simulation))
-    named: dict[str, list[StoryboardElement]] = {}
-    for element in root.walk():
-        named.setdefault(last_name(element.name), []).append(element)
+    named = grouped((last_name(element.name), element) for element in root.walk())
     for look in simulation.when_built:
         look(named)
     if storyboard.stop_trigger is None:

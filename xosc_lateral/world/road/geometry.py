@@ -229,7 +229,13 @@ class ParamCubic(Struct, frozen=True):
 
     def curvature_at(self, ds: float) -> float:
         """Curvature of the curve itself, whatever its parameter. [1/m]"""
-        p = self._parameter_at(ds)
+        return self._curvature_of(self._parameter_at(ds))
+
+    def curvature_in_esmini(self, ds: float) -> float:
+        """Where the parameter has the share of its end that ds has of the length. [1/m]"""
+        return self._curvature_of(ds / self.length * self._parameter_at(self.length))
+
+    def _curvature_of(self, p: float) -> float:
         _, x1, x2, x3 = self.x
         _, y1, y2, y3 = self.y
         dx, dy = x1 + p * (2.0 * x2 + 3.0 * p * x3), y1 + p * (2.0 * y2 + 3.0 * p * y3)

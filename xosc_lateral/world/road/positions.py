@@ -139,8 +139,9 @@ def wrap(angle: float) -> float:
 
 
 def difference(angle: float, reference: float) -> float:
-    """`angle` - `reference` in [-pi, pi)."""
-    return (angle - reference + pi) % TWO_PI - pi
+    """`angle` - `reference` in [-pi, pi]; of half a turn, the sign that it has between angles in [0, 2 pi)."""
+    turn = (angle - reference + pi) % TWO_PI - pi
+    return pi if turn == -pi and angle > reference else turn
 
 
 def is_forward(relative: float) -> bool:

@@ -12,6 +12,7 @@ from operator import or_
 from msgspec import Struct
 from msgspec.structs import replace
 
+from xosc_lateral.base.grouping import grouped
 from xosc_lateral.world.scenario import private_actions
 from xosc_lateral.world.scenario.entity import Controller, Entity
 from xosc_lateral.world.scenario.scenario import Action, Scenario
@@ -263,10 +264,13 @@ class Control:
 
 def controlled_entities(scenario: Scenario) -> dict[str, Control]:
     """Entities that controllers drive at some time, by an action that makes them active, in the scenario's order."""
-    assigned, actions = assigned_controllers(scenario), dict[str, list[object]]()
-    for actors, action in _private_actions(scenario):
-        for actor in actors if isinstance(action.content, private_actions.CONTROLLER) else ():
-            actions.setdefault(actor, []).append(action.content)
+    assigned = assigned_controllers(scenario)
+    actions = grouped(
+        (actor, action.content)
+        for actors, action in _private_actions(scenario)
+        if isinstance(action.content, private_actions.CONTROLLER)
+        for actor in actors
+    )
     reasons = {}
     for entity in scenario.entities:
         names, domains = dict[str, None](), Domains.NONE
@@ -304,13 +308,13 @@ def _switched_on(contents: Iterable[object]) -> Iterator[Domains]:
 
 def assigned_controllers(scenario: Scenario) -> dict[str, list[Controller]]:
     """Controllers of each entity, from the start or later."""
-    assigned = {entity.name: list(entity.controllers) for entity in scenario.entities}
-    for actors, action in _private_actions(scenario):
-        content = action.content
-        if isinstance(content, private_actions.AssignControllerAction) and content.controller is not None:
-            for actor in actors:
-                assigned.setdefault(actor, []).append(content.controller)
-    return assigned
+    later = grouped(
+        (actor, action.content.controller)
+        for actors, action in _private_actions(scenario)
+        if isinstance(action.content, private_actions.AssignControllerAction) and action.content.controller is not None
+        for actor in actors
+    )
+    return {entity.name: [*entity.controllers, *later.get(entity.name, ())] for entity in scenario.entities}
 
 
 def _mark(entity: Entity, controllers: Iterable[Controller]) -> str:

@@ -64,10 +64,7 @@ class Dependence:
     def of_condition(self, condition: Condition) -> bool:
         """Whether a condition depends on them."""
         content = condition.content
-        looked_at = set(entity_references(content))
-        if condition.triggering_entities is not None:
-            looked_at |= set(condition.triggering_entities.entity_refs)
-        if looked_at & self.entities:
+        if not self.entities.isdisjoint(entity_references(condition)):
             return True
         match content:
             case conditions.CollisionCondition(entity_ref=None) | conditions.RelativeClearanceCondition(entity_refs=()):

@@ -37,21 +37,18 @@ class Performance(Struct, frozen=True):
 
 
 class Axle(Struct, frozen=True):
-    """An axle; `position_x` ahead of the reference point. [m], [rad]"""
+    """An axle; `position_x` ahead of the reference point. [m]"""
 
-    max_steering: Zero
     position_x: Zero
     position_z: Zero
-    track_width: Zero
     wheel_diameter: Zero
 
 
 class Axles(Struct, frozen=True):
-    """Front (a trailer may have none), rear and further axles."""
+    """Front (a trailer may have none) and rear."""
 
     front: Annotated[Axle | None, called("FrontAxle")]
     rear: Annotated[Axle | None, called("RearAxle")]
-    additional: Annotated[tuple[Axle, ...], called("AdditionalAxle")] = ()
 
 
 class Controller(Struct, frozen=True):
@@ -83,7 +80,6 @@ class Entity(Struct, frozen=True):
     hitch_x: float | None = None
     coupler_x: float | None = None
     """Of the trailer coupling, ahead of the reference point. [m]"""
-    mass: float | None = None  # [kg]
     model3d: Annotated[str | None, called("model3d", "model")] = None  # 3D model file, as written
     properties: Mapping[str, str] = field(default_factory=dict)  # vendor properties
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Struct
 
-from xosc_lateral.world.scenario.place import Content, EntityRef, Name, ParameterRef, Xml, called
+from xosc_lateral.world.scenario.place import Content, EntityRef, Name, ParameterRef, called
 from xosc_lateral.world.scenario.position import Position
 
 
@@ -58,7 +58,6 @@ class VariableModifyAction(Content, frozen=True):
 class SetMonitorAction(Content, frozen=True):
     """A monitor is set (1.3); nothing in playback reads it."""
 
-    monitor_ref: str
     value: bool
 
 
@@ -113,23 +112,15 @@ class TimeOfDay(Struct, frozen=True):
 class Weather(Struct, frozen=True):
     """Parts that a file does not state are None."""
 
-    cloud_state: Annotated[str | None, called("cloudState", "fractionalCloudCover")] = None  # as written
     illuminance: Annotated[float | None, called("Sun/illuminance", "Sun/intensity")] = None
     """Of the sun (`intensity` up to 1.1). [lx]"""
-    sun_azimuth: Annotated[float | None, called("Sun/azimuth")] = None
-    sun_elevation: Annotated[float | None, called("Sun/elevation")] = None
-    visual_range: Annotated[float | None, Xml(("Fog/visualRange",), finite=False)] = None  # of the fog. [m]
     precipitation_type: Annotated[str | None, called("Precipitation/precipitationType")] = None
     """``dry``, ``rain``, ``snow``."""
     precipitation_intensity: float | None = None
-    """mm/h from 1.1; the unitless 0..1 of version 1.0 is in `precipitation_fraction`."""
-    precipitation_fraction: float | None = None
+    """mm/h; from 1.1: version 1.0 has a share without a unit."""
     wind_speed: Annotated[float | None, called("Wind/speed")] = None
     wind_direction: Annotated[float | None, called("Wind/direction")] = None
     """[m/s], [rad]: direction is where the wind blows to, counter-clockwise from world x."""
-    temperature: float | None = None
-    atmospheric_pressure: float | None = None
-    """[K], [Pa]"""
 
 
 class Environment(Content, frozen=True):
@@ -139,4 +130,3 @@ class Environment(Content, frozen=True):
     time_of_day: TimeOfDay | None = None
     weather: Weather | None = None
     friction_scale_factor: Annotated[float | None, called("RoadCondition/frictionScaleFactor")] = None
-    wetness: Annotated[str | None, called("RoadCondition/wetness")] = None

@@ -239,10 +239,8 @@ class DisconnectTrailerAction(Content, frozen=True):
 
 
 class VisibilityAction(Content, frozen=True):
-    """Seen by graphics, sensors, other traffic."""
+    """Whether other traffic sees it; who else does is nothing to its movement."""
 
-    graphics: Annotated[bool, Xml(default=True)]
-    sensors: Annotated[bool, Xml(default=True)]
     traffic: Annotated[bool, Xml(default=True)]
 
 

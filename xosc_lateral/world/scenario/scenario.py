@@ -16,13 +16,11 @@ from xosc_lateral.world.scenario.place import Content, EntityRefs, Name, No, Pla
 
 
 class FileHeader(Struct, frozen=True):
-    """Version, author, description; `date` as written."""
+    """Version and description."""
 
     major: int
     minor: int
-    author: str
     description: str
-    date: str
 
     @property
     def version(self) -> tuple[int, int]:
