@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from xosc_lateral.extras.recordings.recorded import SHAPES, lateral_plan
+from xosc_lateral.extras.recordings import plan as planning
+from xosc_lateral.extras.recordings.recorded import SHAPES, LateralPlan, Transition, lateral_plan
 from xosc_lateral.world.motion.nominal import EntityMotion, made_vehicle
 from xosc_lateral.world.scenario.enums import DynamicsShape
 
@@ -158,3 +162,19 @@ def test_noise_of_the_positions_makes_no_lane_change_shorter() -> None:
         (change,) = (one for one in lateral_plan(recorded(y), 0.0).transitions if one.lanes)
         errors.append(change.duration - duration)
     assert abs(np.mean(errors)) < 0.25
+
+
+@pytest.mark.parametrize(
+    ("there_from", "begins"), [(0.0, 3.0), (100.0, 4.0 + planning.ENTRY_DELAY), (174.0, 3.0), (900.0, 3.0)]
+)
+def test_a_change_to_a_lane_that_is_yet_to_come_begins_where_it_is(
+    monkeypatch: pytest.MonkeyPatch, there_from: float, begins: float
+) -> None:
+    """At 25 m/s from 3 s to 7 s, which are 75 m and 175 m; where it never comes in time, the change stays."""
+    monkeypatch.setattr(planning, "_target", lambda *_: -2)
+    time = np.arange(0.0, 20.0, 0.04)
+    vehicle: Any = SimpleNamespace(time=time, road=np.zeros(len(time), dtype=np.int32), s=25.0 * time)
+    network: Any = SimpleNamespace(has_lane_at=lambda road, lane, s: s >= there_from - 1e-6)
+    change = Transition(3.0, 4.0, DynamicsShape.SINUSOIDAL, -1, 0.0, -WIDTH)
+    (moved,) = planning._beside_lanes(LateralPlan(0.0, (change,), is_played=False), vehicle, network).transitions
+    assert (moved.start, moved.end) == pytest.approx((begins, 7.0))
