@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
 from signal import SIGINT
@@ -136,8 +136,14 @@ def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
     return {"error": {**what, "path": None if path is None else str(path), **place, "messages": messages}}
 
 
+def _remarked_before(error: XoscLateralError | OSError) -> Iterator[str]:
+    """What was remarked before it, often its cause: the first, and how many more there are."""
+    if remarks := getattr(error, "messages", ()):
+        yield f"remarked before: {remarks[0]}{f', and {len(remarks) - 1} more (--json)' if len(remarks) > 1 else ''}"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 1 the input is at fault (remarks, a line on stderr), 2 wrong usage, 128 + a signal."""
+    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 128 + a signal."""
     words = sys.argv[1:] if argv is None else list(argv)
     try:
         with guarding_inputs(), raising_signals():
@@ -149,9 +155,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         else:
             from xosc_lateral.cli.cures import cures
 
-            for remark in getattr(error, "messages", ()):
-                print(in_terminal(f"xosc-lateral: {remark.to_dict()['severity']}: {remark}"), file=sys.stderr)
-            line = "; ".join([_in_words(error), *cures(words)])
+            line = "; ".join([_in_words(error), *cures(words), *_remarked_before(error)])
             line = in_terminal(f"xosc-lateral: {' '.join(line.split())}")
             if "--json" in words and {"-v", "--verbose"} & {*words}:
                 line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,22 @@ def test_each_set_is_a_cut_in_of_its_own(found: CutIns) -> None:
     assert np.corrcoef(drawn, frame["duration"])[0, 1] > 0.5  # begin and end are where movement is 0.1 m/s
     assert frame["gap"].between(5.0, 60.0).all() and frame["entry"].between(0.1, 2.0).all()
     assert not frame["seen"].isna().any() and (frame["lead"].isna() == ~frame["seen"]).all()
+
+
+def test_the_page_begins_with_who_sees_most_and_has_a_row_for_each_cut_in(found: CutIns, tmp_path: Path) -> None:
+    """Two detectors of one name have columns of their own; what is seen too late is not seen before the marking."""
+    leads = {"lazy (threshold 1)": (-0.3, np.nan), "lazy (threshold 2)": (0.5, -0.2), "keen": (0.8, 0.4)}
+    facts = {"vehicle": "CutIn", "duration": 4.0, "gap": 20.0, "entry": 1.0, "end": 0.1, "lane_keeping": 9.0}
+    rows = [
+        {"set": number, **facts, "detector": name, "seen": lead == lead, "seen_before_marking": lead > 0.0,
+         "lead": lead, "false_alarms": int(name == "keen")}
+        for number in (0, 1) for name, both in leads.items() for lead in both[number : number + 1]
+    ]  # fmt: skip
+    page = replace(found, rows=rows).write_report(tmp_path / "page.html").read_text(encoding="utf-8")
+    finding = "keen sees 2 of 2 cut-ins before the marking, 0.60 s before it in the median, with 2 false alarms"
+    assert f"{finding}; lazy (threshold 1) sees 0." in page
+    table = page[page.index("set by set") :]
+    assert all(f">{heading}</th>" in table for heading in leads) and table.count("<tr>") == 1 + 2
 
 
 @pytest.mark.pages

@@ -13,7 +13,7 @@ import numpy as np
 
 from xosc_lateral.base.errors import NotEnoughDataError
 from xosc_lateral.base.lazy import pd
-from xosc_lateral.base.texts import aligned
+from xosc_lateral.base.texts import aligned, counted
 from xosc_lateral.drivers.model.profile import DriverProfile
 from xosc_lateral.extras.detect.detectors import Detector
 from xosc_lateral.extras.detect.observation import View
@@ -155,16 +155,14 @@ class CutIns(Result):
         seen = early["lead"].count().sort_values(ascending=False, kind="stable")
         best, worst, count = str(seen.index[0]), str(seen.index[-1]), len(self.cases())
         lead = f", {early['lead'].median()[best]:.2f} s before it in the median" if seen[best] else ""
-        alarms = int(early["false_alarms"].sum()[best])
+        alarms = counted(int(early["false_alarms"].sum()[best]), "false alarm")
         others = f"; {worst} sees {seen[worst]}" if worst != best else ""
-        words = f"{alarms} false alarm{'s' * (alarms != 1)}"
-        return f"{best} sees {seen[best]} of {count} cut-ins before the marking{lead}, with {words}{others}."
+        return f"{best} sees {seen[best]} of {count} cut-ins before the marking{lead}, with {alarms}{others}."
 
     def _case_by_case(self) -> Iterator[dict[str, Any]]:
         """Rows of the page: a cut-in with its figures, and when each detector sees it."""
-        labels = self.to_frame()["detector"].unique()
-        names = [str(label).partition(" (")[0] for label in labels]
-        headings = dict(zip(labels, names if len({*names}) == len(names) else labels, strict=True))
+        names = {label: str(label).partition(" (")[0] for label in self.to_frame()["detector"].unique()}
+        headings = names if len({*names.values()}) == len(names) else dict(zip(names, names, strict=True))
         for (number, vehicle, _), rows in self.to_frame().groupby(["set", "vehicle", "duration"], sort=False):
             facts = {f"{name} [{unit}]": rows[name].iloc[0] for name, unit in FACTS.items()}
             leads = dict(zip(rows["detector"].map(headings), rows["lead"], strict=True))
