@@ -13,7 +13,7 @@ pytestmark = pytest.mark.lint
 
 
 # ---- how much there is -----------------------------------------------------------------------------------------------
-MOST_STATEMENTS = {"core": 30_197, "extras": 14_396}
+MOST_STATEMENTS = {"core": 30_193, "extras": 14_396}
 """Statements without docstrings, as counted when these were last set: they only fall. Aimed at: 30,500, 12,800."""
 
 

@@ -32,6 +32,8 @@ from xosc_lateral.workflows.result import PathLike, Result, write_page
 FACTS = {"duration": "s", "gap": "m", "entry": "m/s", "end": "m"}
 """Of a cut-in, with units: from begin to end of its movement; free space to who is cut in on when its side is on the
 marking; how fast it moves sideways then; how far left of the middle of the new lane it ends."""
+CASE = ["set", "vehicle", "duration"]
+"""Columns that tell one cut-in from the others."""
 SHARES = (0.05, 0.5, 0.95)
 DETECTOR_HEADINGS = ("detector", "seen", "before the marking", "time before it [s]", "false alarms")
 
@@ -150,8 +152,11 @@ class CutIns(Result):
 
     def _finding(self) -> str:
         """Who sees most of the cut-ins before the marking and who fewest, in a sentence."""
-        frame = self.to_frame()
-        early = frame.assign(lead=frame["lead"].where(frame["seen_before_marking"])).groupby("detector", sort=False)
+        early = (
+            self.to_frame()
+            .assign(lead=lambda rows: rows["lead"].where(rows["seen_before_marking"]))
+            .groupby("detector", sort=False)
+        )
         seen = early["lead"].count().sort_values(ascending=False, kind="stable")
         best, worst, count = str(seen.index[0]), str(seen.index[-1]), len(self.cases())
         lead = f", {early['lead'].median()[best]:.2f} s before it in the median" if seen[best] else ""
@@ -161,16 +166,17 @@ class CutIns(Result):
 
     def _case_by_case(self) -> Iterator[dict[str, Any]]:
         """Rows of the page: a cut-in with its figures, and when each detector sees it."""
-        names = {label: str(label).partition(" (")[0] for label in self.to_frame()["detector"].unique()}
-        headings = names if len({*names.values()}) == len(names) else dict(zip(names, names, strict=True))
-        for (number, vehicle, _), rows in self.to_frame().groupby(["set", "vehicle", "duration"], sort=False):
-            facts = {f"{name} [{unit}]": rows[name].iloc[0] for name, unit in FACTS.items()}
-            leads = dict(zip(rows["detector"].map(headings), rows["lead"], strict=True))
-            yield {"set": number, "vehicle": vehicle, "false alarms": int(rows["false_alarms"].sum()), **facts, **leads}
+        names = {row["detector"]: row["detector"].partition(" (")[0] for row in self.rows}
+        if len({*names.values()}) < len(names):  # two of one name, with other settings
+            names = {label: label for label in names}
+        for (number, vehicle, _), rows in self.to_frame().groupby(CASE, sort=False):
+            facts = {"set": number, "vehicle": vehicle, "false alarms": int(rows["false_alarms"].sum())}
+            facts |= {f"{name} [{unit}]": rows[name].iloc[0] for name, unit in FACTS.items()}
+            yield facts | dict(zip(rows["detector"].map(names), rows["lead"], strict=True))
 
     def cases(self) -> pd.DataFrame:
         """One row per cut-in, whatever detectors made of it."""
-        return self.to_frame().drop_duplicates(["set", "vehicle", "duration"])
+        return self.to_frame().drop_duplicates(CASE)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per cut-in and detector: set, vehicle, `FACTS`, seen, lead [s], false alarms, lane keeping [s]."""

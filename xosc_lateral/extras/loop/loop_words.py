@@ -309,5 +309,7 @@ def shown_words(shown: Sequence[Shown]) -> str:
     untaken = f" Changes with time, as a driver settles or tires, were not looked for: {short}." if short else ""
     if not words:
         return f"In these drives no effect of a column would be found.{untaken}"
-    changes = f"Four of five changes {' or '.join(words)} would be found in these drives"
-    return f"{changes} (median over columns; each in the report).{untaken}"
+    return (
+        f"Four of five changes {' or '.join(words)} would be found in these drives (median over columns; each in the "
+        f"report).{untaken}"
+    )

@@ -20,7 +20,7 @@ from xosc_lateral.drivers.drives.drive import STEP
 from xosc_lateral.drivers.model.plausibility import Bound
 from xosc_lateral.drivers.model.profile import SIDES, Basis, DriverProfile
 from xosc_lateral.files.source import read_source
-from xosc_lateral.world.motion.gaps import Gap
+from xosc_lateral.world.motion.gaps import Gap, contacts_of
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.world.motion.segments import Crossing, SegmentSpan
 from xosc_lateral.world.road.network import RoadNetwork
@@ -210,19 +210,24 @@ class Enriched:
 
     def contact_notes(self) -> Iterator[Note]:
         """Contacts that are new, that are gone, and that come earlier or later."""
-        for gaps, what in (
-            (self.new_contacts, "touch at {:.1f} s, and without the offsets they do not"),
-            (self.lost_contacts, "do not touch, as they do at {:.1f} s without the offsets"),
+        before, after = contacts_of(self.gaps_before), contacts_of(self.gaps_after)
+        moved = {
+            names: before[names]
+            for names in after
+            if names in before and abs(after[names] - before[names]) > CONTACT_MOVED
+        }
+        for names, what in (
+            *(
+                (gap.names, f"touch at {gap.time:.1f} s, and without the offsets they do not")
+                for gap in self.new_contacts
+            ),
+            *(
+                (gap.names, f"do not touch, as they do at {gap.time:.1f} s without the offsets")
+                for gap in self.lost_contacts
+            ),
+            *((names, f"touch at {after[names]:.1f} s instead of at {then:.1f} s") for names, then in moved.items()),
         ):
-            for gap in gaps:
-                both = "'{}' and '{}' ".format(*gap.names)
-                yield Note(both + what.format(gap.time), is_warning=True, run=NOMINAL_RUN)
-        touched = {gap.names: gap.time for gap in self.gaps_before if gap.touches}
-        for gap in self.gaps_after:
-            before = touched.get(gap.names, gap.time)
-            if gap.touches and abs(gap.time - before) > CONTACT_MOVED:
-                what = f"'{gap.names[0]}' and '{gap.names[1]}' touch at {gap.time:.1f} s instead of at {before:.1f} s"
-                yield Note(what, is_warning=True, run=NOMINAL_RUN)
+            yield Note("'{}' and '{}' ".format(*names) + what, is_warning=True, run=NOMINAL_RUN)
 
     def warnings(self) -> Iterator[Note]:
         """What a user has to know of it."""
@@ -237,7 +242,7 @@ class Enriched:
 
 
 def _touching_only_in(gaps: Sequence[Gap], others: Sequence[Gap]) -> tuple[Gap, ...]:
-    touching = {gap.names for gap in others if gap.touches}
+    touching = contacts_of(others)
     return tuple(gap for gap in gaps if gap.touches and gap.names not in touching)
 
 

@@ -23,7 +23,7 @@ from xosc_lateral.base.arrays import rate
 from xosc_lateral.base.limits import REPEATED_RUNS
 from xosc_lateral.base.note import Note
 from xosc_lateral.workflows.conversion.result import CONTACT_MOVED, EventShift
-from xosc_lateral.world.motion.gaps import gaps_of
+from xosc_lateral.world.motion.gaps import contacts_of, gaps_of
 from xosc_lateral.world.motion.look import STORY_PREFIX, Finding
 from xosc_lateral.world.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.world.road.network import RoadNetwork
@@ -139,7 +139,7 @@ def compare_runs(
     for change in (*others, *(_other_end(shifts, before, after) if ends else ())):
         changes.setdefault(change.what, change)
     touching = [
-        {one.names: one.time for one in gaps_of(run, run.entities) if one.touches and not set(one.names) <= {*ignored}}
+        {names: at for names, at in contacts_of(gaps_of(run, run.entities)).items() if not set(names) <= {*ignored}}
         for run in (before, after)
     ]
     findings = []

@@ -81,7 +81,5 @@ class DriverClock(Struct, frozen=True, eq=False):
 
     def limit_where_cut(self, at: FloatArray) -> FloatArray:
         """Of the lateral speed by the clock, at distances where an action may begin, which takes it away. [m/s]"""
-        way = way_of(
-            np.interp(at, self.distance, self.speed)
-        )  # in a second of the clock, which is slower below 40 km/h
+        way = way_of(np.interp(at, self.distance, self.speed))  # in its second, which is longer below 40 km/h
         return CUT_SHARE * np.minimum(FRAME_TURN * way, LATERAL_ACCELERATION * LOOK_STEP)

@@ -11,7 +11,7 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,11 @@ class Gap(Struct, frozen=True):
     def touches(self) -> bool:
         """Whether the boxes overlap or meet."""
         return self.distance <= 0.0
+
+
+def contacts_of(gaps: Iterable[Gap]) -> dict[tuple[str, str], float]:
+    """When each pair that touches does so first. [s]"""
+    return {gap.names: gap.time for gap in gaps if gap.touches}
 
 
 def gaps_of(motion: NominalMotion, paths: Sequence[Track]) -> tuple[Gap, ...]:
